@@ -1,0 +1,43 @@
+# Everything happens in .venv, made on first use. PYTHON names the interpreter it is made with.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+ATLAS := build/atlas.nc
+
+.DEFAULT_GOAL := help
+.PHONY: help install atlas test bench check figures clean
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
+
+install: $(VENV)/installed  ## make .venv and install the package into it
+
+$(VENV)/installed: pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit("towatlas needs Python 3.11 or later, this is " + sys.version.split()[0] if sys.version_info < (3, 11) else 0)'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[test,bench,check]'
+	@touch $@
+
+atlas: install  ## build build/atlas.nc
+	$(BIN)/python -m atlas build --out $(ATLAS)
+
+test: install  ## run the tests
+	$(BIN)/python -m pytest
+
+bench: install  ## measure error and time, print the tables, update the one in the README
+	$(BIN)/python -m benchmarks
+
+check: install  ## ruff, types, import layers
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+figures: install  ## draw the figures of the README from build/atlas.nc
+	@test -f $(ATLAS) || $(MAKE) --no-print-directory atlas
+	$(BIN)/python -m atlas plot critical --atlas $(ATLAS) --out docs/critical.svg
+	$(BIN)/python -m atlas plot critical --atlas $(ATLAS) --out docs/critical.png
+
+clean:  ## remove .venv, build and caches
+	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

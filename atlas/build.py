@@ -1,0 +1,421 @@
+"""Building an atlas file: the grids, the sweeps over them, and what goes into the file."""
+
+import importlib.metadata
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from atlas import interpolant
+from atlas.critical import solve_rows
+from atlas.dataset import WITNESS, plain_table, root_attributes, symbol_attributes, variable, write_atlas
+from atlas.limits import excess_length, threshold_length
+from atlas.lookup import INTERPOLANT, SCHEMA_VERSION
+from kernels import status
+from kernels.compiling import source_hash
+from kernels.sweeps import scan_systems_parallel
+
+Array = NDArray[np.float64]
+
+
+def _decades(low: int, high: int, per_decade: int) -> Array:
+    return 10.0 ** np.linspace(low, high, (high - low) * per_decade + 1)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Where an atlas is tabulated. The defaults are those of `make atlas`."""
+
+    n_max: int = 6
+    w_f_max: float = 1e4
+    excess_min: float = 1e-3
+    excess_max: float = 1e3
+    series_w_f: int = 96
+    series_excess: int = 112
+    error_blocks: int = 12
+    w_f: Array = field(default_factory=lambda: np.concatenate([[0.0], _decades(-3, 4, 8)]))
+    lam: Array = field(default_factory=lambda: _decades(0, 3, 40))
+
+    @property
+    def size(self) -> int:
+        """Number of folds to solve: nodes, points between them, table."""
+        nodes = self.series_w_f * self.series_excess + (self.series_w_f - 1) * (self.series_excess - 1)
+        return self.n_max * (nodes + len(self.w_f) * len(self.lam))
+
+
+@dataclass(frozen=True)
+class ScanSettings:
+    """How finely `scan` looks. Speeds are spaced evenly in their logarithm, from just below 1/sqrt(lambda)."""
+
+    speeds: int = 240
+    guesses: int = 1024
+    segments: int = 100
+    gamma_max: float = 20.0
+    n_max: int = 4
+    tolerance: float = 1e-9
+    w_f: Array = field(default_factory=lambda: np.array([0.0, 1.0, 10.0, 100.0, 1352.0]))
+    lam: Array = field(default_factory=lambda: np.array([2.5, 5.0, 10.0, 20.0, 37.8]))
+
+    @property
+    def size(self) -> int:
+        """Number of folds looked for."""
+        return self.n_max * len(self.w_f) * len(self.lam)
+
+    def attributes(self) -> dict[str, Any]:
+        """What a reader must know to judge the scan."""
+        return {
+            "speeds": self.speeds,
+            "guesses": self.guesses,
+            "segments": self.segments,
+            "gamma_max": self.gamma_max,
+            "gamma_tolerance": self.tolerance,
+            "comment": "Forward Runge-Kutta shots over the bounds of Eq. (35). The resolution holds the final bracket "
+            "and the change when the segments are doubled. A pair of roots closer than 1/guesses of those bounds can "
+            "be missed: such a transition, and any beyond gamma_max, has status not_found_by_scan.",
+        }
+
+
+# Twenty values a scan of a whole table can afford on each axis.
+WHOLE_SCAN = ScanSettings(w_f=np.concatenate([[0.0], _decades(-2, 4, 2)]), lam=_decades(0, 2, 16)[4:], guesses=512)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a finished build has to say for itself."""
+
+    path: Path
+    method: str
+    ranges: str
+    folds: int
+    worst_error: float
+    worst_at: str
+    witness: str
+    seconds: float
+    bytes: int
+
+    def __str__(self) -> str:
+        lines = [
+            f"{self.path}  ({self.bytes / 1e6:.2f} MB, method {self.method})",
+            f"  ranges       {self.ranges}",
+            f"  folds        {self.folds}",
+            f"  worst error  {self.worst_error:.1e} relative (estimated), {self.worst_at}",
+        ]
+        if self.witness:
+            lines.append(f"  witness      {self.witness}")
+        return "\n".join([*lines, f"  time         {self.seconds:.1f} s"])
+
+
+@contextmanager
+def _threads(count: int | None) -> Iterator[None]:
+    before = numba.get_num_threads()
+    limit = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    if count is not None:
+        if not 1 <= count <= limit:
+            raise ValueError(f"threads must be 1 to {limit} on this machine, got {count}")
+        numba.set_num_threads(count)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
+
+
+def build_atlas(
+    path: Path,
+    method: str = "fold",
+    *,
+    grid: Grid | None = None,
+    scan: ScanSettings | None = None,
+    threads: int | None = None,
+    progress: bool = True,
+) -> Summary:
+    """Build an atlas file and move it into place.
+
+    Parameters
+    ----------
+    path : Path
+        Where the file goes; what is there stays whole until the new one is.
+    method : {"fold", "scan"}
+        Direct solution of every fold, with a scan of some cables beside it as a witness; or a table by scan alone.
+    grid : Grid, optional
+        Where `fold` tabulates.
+    scan : ScanSettings, optional
+        What `scan` looks at: the witness, or the whole table.
+    threads : int, optional
+        Threads to use; all by default. The file does not depend on it.
+    progress : bool
+        Whether to show a progress bar on standard error.
+
+    Returns
+    -------
+    Summary
+    """
+    start = time.perf_counter()
+    if method not in ("fold", "scan"):
+        raise ValueError(f"method must be fold or scan, got {method!r}")
+    grid = grid or Grid()
+    scan = scan or (ScanSettings() if method == "fold" else WHOLE_SCAN)
+    total = scan.size + (grid.size if method == "fold" else 0)
+    with _threads(threads), tqdm(total=total, unit="fold", disable=not progress, leave=False) as bar:
+        if method == "fold":
+            root, groups, facts = _build_fold(grid, scan, bar)
+        else:
+            root, groups, facts = _build_scan(scan, bar)
+        bar.set_description("writing")
+        root.attrs = root_attributes(method, _provenance(method) | facts.pop("attributes"))
+        write_atlas(path, root, groups)
+    return Summary(path=path, method=method, seconds=time.perf_counter() - start, bytes=path.stat().st_size, **facts)
+
+
+def _provenance(method: str) -> dict[str, Any]:
+    versions = " ".join(
+        f"{name} {importlib.metadata.version(name)}" for name in ("numpy", "numba", "xarray", "netCDF4")
+    )
+    command = f"python -m atlas build --method {method}"
+    attributes = {
+        "schema_version": np.int32(SCHEMA_VERSION),
+        "towatlas_version": importlib.metadata.version("towatlas"),
+        "kernel_sources_sha256": source_hash(),
+        "library_versions": versions,
+        "command": command,
+        "history": command,
+    }
+    # The clock of the machine would make two builds differ.
+    if epoch := os.environ.get("SOURCE_DATE_EPOCH"):
+        try:
+            date = datetime.fromtimestamp(int(epoch), UTC)
+        except (ValueError, OverflowError, OSError):
+            raise ValueError(f"SOURCE_DATE_EPOCH must be seconds since 1970, got {epoch!r}") from None
+        attributes["date_created"] = date.strftime("%Y-%m-%dT%H:%M:%SZ")
+        attributes["history"] = f"{attributes['date_created']} {command}"
+    return attributes
+
+
+def _solve_grid(
+    shape: tuple[int, ...], bar: tqdm, label: str, guess: tuple[Array, Array] | None = None, **columns: NDArray[Any]
+) -> dict[str, NDArray[Any]]:
+    """Solve the folds of arrays that broadcast to `shape`, one transition (first axis) at a time."""
+    bar.set_description(label)
+    flat = {name: np.broadcast_to(column, shape) for name, column in columns.items()}
+    parts = []
+    for k in range(shape[0]):
+        rows = {name: column[k].ravel() for name, column in flat.items()}
+        part = solve_rows(
+            rows["n"], rows["w_f"], rows["lam"], rows["excess"], guess and (guess[0][k].ravel(), guess[1][k].ravel())
+        )
+        parts.append(part)
+        bar.update(len(part["gamma"]))
+    return {name: np.stack([part[name] for part in parts]).reshape(shape) for name in parts[0]}
+
+
+def _build_fold(grid: Grid, scan: ScanSettings, bar: tqdm) -> tuple[xr.Dataset, dict[str, xr.Dataset], dict[str, Any]]:
+    axes = interpolant.Axes(grid.excess_min, grid.excess_max, grid.w_f_max)
+    series, series_error = _fit_series(grid, axes, bar)
+    n = np.arange(1, grid.n_max + 1)
+    orders = n[:, None, None]
+    w_f = grid.w_f[:, None]
+    shape = (grid.n_max, len(grid.w_f), len(grid.lam))
+    excess = excess_length(grid.lam, w_f, orders)
+    table = _solve_grid(shape, bar, "table", n=orders, w_f=w_f, lam=grid.lam, excess=excess)
+    root = plain_table(n, grid.w_f, grid.lam, threshold_length(grid.w_f, n[:, None]), table)
+    groups = {INTERPOLANT: _interpolant_group(axes, series, series_error), WITNESS: _witness(scan, bar)}
+
+    solved = table["status"] == status.OK
+    failed = int(
+        np.sum(~solved & (table["status"] != status.NO_TRANSITION) & (table["status"] != status.LOST_IN_ROUNDING))
+    )
+    if failed:
+        raise RuntimeError(f"{failed} folds of the table did not converge; this is a defect, please report it")
+    domain = solved & (excess >= grid.excess_min)
+    worst = np.unravel_index(np.argmax(np.where(domain, table["error"], 0.0)), shape)
+    lookup_worst = float(series_error.max())
+    difference = np.abs(groups[WITNESS]["difference"].values)
+    found = np.isfinite(difference)
+    missed = int(np.sum(groups[WITNESS]["missed"].values))
+    facts: dict[str, Any] = {
+        "ranges": f"n 1..{grid.n_max}, w_f 0..{grid.w_f_max:g}, "
+        f"lambda - lambda_cn {grid.excess_min:g}..{grid.excess_max:g}",
+        "folds": int(solved.sum()) + series["gamma"].size,
+        "worst_error": float(table["error"][worst]),
+        "worst_at": f"n = {n[worst[0]]}, w_f = {grid.w_f[worst[1]]:g}, lambda = {grid.lam[worst[2]]:g}; "
+        f"between nodes {lookup_worst:.1e}",
+        "witness": f"{found.sum()} folds by scan, largest difference {difference[found].max():.1e}; "
+        f"{missed} transitions the scan did not see",
+        "attributes": {
+            "solver_tolerance": "8 eps (1 + lambda / (lambda - lambda_cn)) in the last step",
+            "worst_table_error": float(table["error"][worst]),
+            "worst_lookup_error": lookup_worst,
+        },
+    }
+    return root, groups, facts
+
+
+def _fit_series(grid: Grid, axes: interpolant.Axes, bar: tqdm) -> tuple[dict[str, Array], Array]:
+    """Chebyshev series of every field, and the error map of gamma.
+
+    The error map is measured against the direct solver half way between the nodes: in each of error_blocks squares of
+    the unit square the largest difference, of any field, twice over.
+    """
+    orders = np.arange(1, grid.n_max + 1)[:, None, None]
+
+    def solve(
+        x: Array, y: Array, label: str, guess: tuple[Array, Array] | None = None
+    ) -> tuple[dict[str, Array], Array]:
+        excess, w_f = axes.excess(x), axes.w_f(y)[:, None]
+        shape = (grid.n_max, len(y), len(x))
+        columns = {"n": orders, "w_f": w_f, "lam": threshold_length(w_f, orders) + excess, "excess": excess}
+        solved = _solve_grid(shape, bar, label, guess, **columns)
+        if (solved["status"] != status.OK).any():
+            raise RuntimeError("a fold inside the domain did not converge; this is a defect, please report it")
+        return {name: interpolant.to_field(name, solved[name], excess) for name in interpolant.FIELDS}, excess
+
+    x, y = interpolant.nodes(grid.series_excess), interpolant.nodes(grid.series_w_f)
+    series = {name: interpolant.coefficients(values) for name, values in solve(x, y, "series")[0].items()}
+
+    x, y = interpolant.midpoints(grid.series_excess), interpolant.midpoints(grid.series_w_f)
+    between = {name: interpolant.tensor(series[name], x, y) for name in interpolant.FIELDS}
+    gamma = np.exp(between["gamma"]) / np.sqrt(axes.excess(x))
+    exact, _ = solve(x, y, "checking", (np.exp(between["x_f"]) * gamma**2, gamma))
+    difference = np.max([np.abs(between[name] - exact[name]) for name in interpolant.FIELDS], axis=0)
+    blocks = grid.error_blocks
+    rows, columns = (np.minimum((0.5 * (c + 1.0) * blocks).astype(int), blocks - 1) for c in (y, x))
+    error_map = np.zeros((grid.n_max, blocks, blocks))
+    for k in range(grid.n_max):
+        np.maximum.at(error_map[k], (rows[:, None], columns), 2.0 * difference[k])
+    return series, error_map
+
+
+def _interpolant_group(axes: interpolant.Axes, series: dict[str, Array], error_map: Array) -> xr.Dataset:
+    dims = ("series_n", "w_f_degree", "excess_degree")
+    variables: dict[str, xr.Variable] = {}
+    for name, values in series.items():
+        attributes = symbol_attributes(name) | {
+            "long_name": f"Chebyshev series of the logarithm of {name}, see comment"
+        }
+        variables[f"{name}_series"] = xr.Variable(dims, values, attributes)
+    variables["gamma_error"] = xr.Variable(
+        ("series_n", "w_f_block", "excess_block"),
+        error_map,
+        {
+            "long_name": "relative interpolation error in each block of the unit square, of the worst field",
+            "units": "1",
+        },
+    )
+    return xr.Dataset(
+        variables,
+        attrs={
+            "excess_min": axes.excess_min,
+            "excess_max": axes.excess_max,
+            "w_f_max": axes.w_f_max,
+            "w_f_scale": interpolant.W_SCALE,
+            "comment": "x and y in [-1, 1] are linear in log(lam - lambda_c) and in log(1 + w_f / w_f_scale), from "
+            "excess_min to excess_max and from 0 to w_f_max. sum_ij series[n, i, j] T_i(y) T_j(x) is "
+            "log(gamma_c sqrt(lam - lambda_c)), log(-R_x0_c), log(abs(x_f)), log(z_f); x_f has the sign of (-1)^n.",
+        },
+    )
+
+
+def _scan_grid(scan: ScanSettings, bar: tqdm, label: str) -> tuple[Array, NDArray[np.int8]]:
+    """Scan every cable of the settings: results of shape (w_f, lam, n, 4), statuses (w_f, lam, n)."""
+    bar.set_description(label)
+    shape = (len(scan.w_f), len(scan.lam))
+    w_f, lam = (np.ascontiguousarray(a.ravel()) for a in np.broadcast_arrays(scan.w_f[:, None], scan.lam))
+    results = np.empty((w_f.size, scan.n_max, 4))
+    statuses = np.empty((w_f.size, scan.n_max), np.int64)
+    # No fold lies below the resonance of a pendulum as long as the cable, gamma^2 lambda = 1.
+    low = 0.95 / np.sqrt(lam)
+    high = np.full(w_f.size, scan.gamma_max)
+    block = 8 * numba.get_num_threads()
+    for begin in range(0, w_f.size, block):
+        part = slice(begin, begin + block)
+        scan_systems_parallel(
+            w_f[part],
+            lam[part],
+            low[part],
+            high[part],
+            scan.speeds,
+            scan.guesses,
+            scan.segments,
+            scan.n_max,
+            scan.tolerance,
+            results[part],
+            statuses[part],
+        )
+        bar.update(len(w_f[part]) * scan.n_max)
+    excess = excess_length(lam[:, None], w_f[:, None], np.arange(1, scan.n_max + 1))
+    statuses[(excess <= 0.0) & (statuses == status.NOT_FOUND)] = status.NO_TRANSITION
+    return results.reshape(*shape, scan.n_max, 4), statuses.reshape(*shape, scan.n_max).astype(np.int8)
+
+
+def _witness(scan: ScanSettings, bar: tqdm) -> xr.Dataset:
+    results, statuses = _scan_grid(scan, bar, "witness")
+    results, statuses = np.moveaxis(results, 2, 0), np.moveaxis(statuses, 2, 0)
+    n = np.arange(1, scan.n_max + 1)
+    shape = statuses.shape
+    orders = np.broadcast_to(n[:, None, None], shape)
+    w_f, lam = (np.broadcast_to(a, shape) for a in (scan.w_f[:, None], scan.lam))
+    flat = orders.ravel(), w_f.ravel(), lam.ravel()
+    direct = solve_rows(*flat, excess_length(flat[2], flat[1], flat[0]))
+    gamma = direct["gamma"].reshape(shape)
+    missed = (statuses != status.OK) & (gamma < scan.gamma_max)
+    # Names of their own: a reader that merges the groups must not take these axes for those of the table.
+    dims = ("scan_n", "scan_w_f", "scan_lam")
+    one = {"units": "1"}
+    return xr.Dataset(
+        {
+            "gamma_scan": variable(dims, "gamma", results[..., 0]),
+            "R_x0_scan": variable(dims, "R_x0", results[..., 1]),
+            "gamma_resolution": xr.Variable(dims, results[..., 2], {"long_name": "resolution of gamma_scan"} | one),
+            "R_x0_resolution": xr.Variable(dims, results[..., 3], {"long_name": "resolution of R_x0_scan"} | one),
+            "difference": xr.Variable(
+                dims, results[..., 0] / gamma - 1.0, {"long_name": "gamma_scan over the direct solution, minus 1"} | one
+            ),
+            "missed": xr.Variable(
+                dims,
+                missed.astype(np.int8),
+                {"long_name": "transitions below gamma_max that the scan did not see"} | one,
+            ),
+            "status": variable(dims, "status", statuses),
+        },
+        {
+            "scan_n": variable(("scan_n",), "n", n),
+            "scan_w_f": variable(("scan_w_f",), "w_f", scan.w_f),
+            "scan_lam": variable(("scan_lam",), "lam", scan.lam),
+        },
+        attrs=scan.attributes(),
+    )
+
+
+def _build_scan(scan: ScanSettings, bar: tqdm) -> tuple[xr.Dataset, dict[str, xr.Dataset], dict[str, Any]]:
+    results, statuses = _scan_grid(scan, bar, "scan")
+    results, statuses = np.moveaxis(results, 2, 0), np.moveaxis(statuses, 2, 0)
+    n = np.arange(1, scan.n_max + 1)
+    table = {
+        "gamma": results[..., 0],
+        "R_x0": results[..., 1],
+        "tension": np.hypot((scan.w_f[:, None] + scan.lam), results[..., 1]),
+        "error": results[..., 2] / results[..., 0],
+        "status": statuses,
+    }
+    root = plain_table(n, scan.w_f, scan.lam, threshold_length(scan.w_f, n[:, None]), table)
+    found = statuses == status.OK
+    worst = np.unravel_index(np.argmax(np.where(found, table["error"], 0.0)), found.shape)
+    facts: dict[str, Any] = {
+        "ranges": f"n 1..{scan.n_max}, w_f {scan.w_f.min():g}..{scan.w_f.max():g}, "
+        f"lambda {scan.lam.min():g}..{scan.lam.max():g}, gamma to {scan.gamma_max:g}",
+        "folds": int(found.sum()),
+        "worst_error": float(table["error"][worst]),
+        "worst_at": f"n = {n[worst[0]]}, w_f = {scan.w_f[worst[1]]:g}, lambda = {scan.lam[worst[2]]:g}",
+        "witness": f"{np.sum(statuses == status.NOT_FOUND)} transitions not seen or beyond gamma = {scan.gamma_max:g}",
+        "attributes": {f"scan_{name}": value for name, value in scan.attributes().items()},
+    }
+    return root, {}, facts

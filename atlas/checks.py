@@ -1,0 +1,56 @@
+"""Every check on what a user passes. Each raises ValueError with the rule, the value given and the remedy."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+OUTSIDE_CHOICES = ("raise", "nan", "solve")
+
+
+def check_real(name: str, value: Any) -> NDArray[np.float64]:
+    """Real numbers of any numeric dtype, as float64."""
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name} must be a number or an array of numbers: {error}") from None
+    if array.dtype.kind not in "iuf":
+        raise ValueError(
+            f"{name} must be a real number or an array of them, got {value!r} ({array.dtype}); convert it first"
+        )
+    return array.astype(np.float64)
+
+
+def check_order(value: Any) -> NDArray[np.int64]:
+    """Number of a transition: whole numbers from 1."""
+    array = check_real("n", value)
+    bad = ~((array >= 1) & (array == np.floor(array)) & (array < 2**31))
+    if bad.any():
+        raise ValueError(f"n counts the transitions and must be a whole number from 1, got {array[bad].flat[0]:g}")
+    return array.astype(np.int64)
+
+
+def check_broadcast(**arrays: NDArray) -> list[NDArray]:
+    """Arrays of one common shape."""
+    try:
+        return list(np.broadcast_arrays(*arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise ValueError(f"shapes do not broadcast together: {shapes}; add or reorder axes") from None
+
+
+def check_outside(choice: str) -> str:
+    """What to do with points outside the atlas."""
+    if choice not in OUTSIDE_CHOICES:
+        raise ValueError(f"outside must be one of {', '.join(OUTSIDE_CHOICES)}; got {choice!r}")
+    return choice
+
+
+def check_positive_finite(name: str, array: NDArray[np.float64], *, zero: bool = False) -> None:
+    """Finite and above zero everywhere (or zero itself, where that is allowed)."""
+    good = np.isfinite(array) & ((array >= 0.0) if zero else (array > 0.0))
+    if not good.all():
+        rule = "finite and not negative" if zero else "finite and positive"
+        raise ValueError(
+            f"{name} must be {rule}, got {array[~good].flat[0]:g} ({np.sum(~good)} of {array.size} values)"
+        )

@@ -1,0 +1,88 @@
+"""Closed forms of the vacuum problem: thresholds and limits. Lengths over the tow radius, forces over (mu+rho A)gR."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+
+def threshold_offset(w_f: ArrayLike) -> NDArray[np.float64]:
+    """Offset of the fish at every threshold, sqrt(1 + w_f^2) - w_f, without cancellation."""
+    w_f = np.asarray(w_f, float)
+    with np.errstate(over="ignore"):
+        return 1.0 / (w_f + np.hypot(1.0, w_f))
+
+
+def threshold_length(w_f: ArrayLike, n: ArrayLike = 1) -> NDArray[np.float64]:
+    """Cable length at and below which there is no n-th transition.
+
+    Parameters
+    ----------
+    w_f : array_like
+        Fish weight [-], >= 0.
+    n : array_like of int
+        Number of the transition, >= 1.
+
+    Returns
+    -------
+    ndarray
+        lambda_cn [-], of the broadcast shape.
+
+    Notes
+    -----
+    lambda_cn = 2 n - 1 + sqrt(1 + w_f^2) - w_f. Near it gamma_cn grows without bound, as (lambda - lambda_cn)^(-1/2).
+
+    References
+    ----------
+    NRL Report 7048, Eq. (36), for n = 1.
+
+    Examples
+    --------
+    >>> float(threshold_length(0.0, 2))
+    4.0
+    """
+    return (2.0 * np.asarray(n) - 1.0) + threshold_offset(w_f)
+
+
+def excess_length(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> NDArray[np.float64]:
+    """Cable length beyond the threshold, lambda - lambda_cn(w_f) [-]; its rounding error is that of lambda.
+
+    Examples
+    --------
+    >>> float(excess_length(10.0, 0.0, 1))
+    8.0
+    """
+    return (np.asarray(lam, float) - (2.0 * np.asarray(n) - 1.0)) - threshold_offset(w_f)
+
+
+def massless_cable(lam: ArrayLike) -> NDArray[np.float64]:
+    """First critical speed gamma_c1 for w_f -> infinity, (lambda^(2/3) - 1)^(-3/4); nan for lambda <= 1.
+
+    The cable is then a straight rod that carries a point mass.
+
+    Examples
+    --------
+    >>> round(float(massless_cable(8.0)), 12)
+    0.438691337651
+    """
+    lam = np.asarray(lam, float)
+    base = np.cbrt(lam) ** 2 - 1.0
+    return np.where(base > 0.0, np.abs(base), np.nan) ** -0.75
+
+
+def long_cable(n: ArrayLike) -> NDArray[np.float64]:
+    """gamma_cn^2 lambda for lambda -> infinity without a fish, z_n = j_{0,n}^2 / 4 with the n-th zero of J0.
+
+    The cable is then a hanging chain at its n-th resonance; the correction is of order lambda^(-2/3).
+
+    Examples
+    --------
+    >>> round(float(long_cable(1)), 12)
+    1.445796490737
+    """
+    n = np.asarray(n)
+    # Bessel's integral by the trapezoidal rule, exact to rounding for a periodic integrand with so many points.
+    angle = np.pi * (np.arange(4 * np.max(n) + 64) + 0.5) / (4 * np.max(n) + 64)
+    root = np.pi * (n - 0.25) + 1.0 / (8.0 * np.pi * (n - 0.25))
+    for _ in range(6):
+        phase = np.multiply.outer(root, np.sin(angle))
+        root = root + np.cos(phase).mean(axis=-1) / np.cos(angle - phase).mean(axis=-1)
+    return 0.25 * root**2

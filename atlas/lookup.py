@@ -1,0 +1,242 @@
+"""Answers from an atlas file. Needs numpy and netCDF4 only."""
+
+import os
+import sys
+from collections.abc import Callable
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from atlas import interpolant
+from atlas.checks import check_broadcast, check_order, check_outside, check_real
+from atlas.critical import CriticalStates, solve_rows
+from atlas.limits import excess_length, threshold_length
+from atlas.nomenclature import SYMBOLS
+from atlas.seal import AtlasFileError, read_sealed
+from kernels import status
+
+SCHEMA_VERSION = 1
+INTERPOLANT = "support/interpolant"  # the group of the series
+EPS = np.finfo(float).eps
+ROUNDINGS = 24.0  # as in kernels.extract, whose import would bring numba (test_error_constants_agree)
+
+Array = NDArray[np.float64]
+
+
+def default_path() -> Path:
+    """The atlas used when none is named: $TOWATLAS_FILE, else build/atlas.nc."""
+    return Path(os.environ.get("TOWATLAS_FILE", "build/atlas.nc"))
+
+
+def open_atlas(path: str | os.PathLike | None = None) -> "Atlas":
+    """Open an atlas file and check that it is whole.
+
+    Parameters
+    ----------
+    path : path, optional
+        The file; without it $TOWATLAS_FILE, else build/atlas.nc.
+
+    Returns
+    -------
+    Atlas
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    AtlasFileError
+        If the file is damaged (a single changed bit is noticed), is no atlas, or was written by a newer version.
+
+    Examples
+    --------
+    >>> atlas = open_atlas()                                    # doctest: +SKIP
+    >>> float(atlas.critical_speed(37.8, 1352, n=2))            # doctest: +SKIP
+    3.41756706...
+    """
+    return Atlas(default_path() if path is None else Path(path))
+
+
+class Atlas:
+    """Critical states of the vacuum problem, interpolated from an atlas file. Made by `open_atlas`.
+
+    The methods `critical_speed`, `reaction`, `fish_offset`, `fish_depth`, `tow_tension`, `error` and `status` take
+    (lam, w_f, n=1, outside="raise"), scalars, arrays that broadcast or xarray objects, and return one quantity;
+    `states` takes the same and returns all of them.
+
+    lam : cable length over tow radius [-]; w_f : fish weight [-]; n : number of the transition.
+    outside : what becomes of points the table does not hold (too close to the threshold, too long a cable, too heavy
+    a fish, n beyond the table, nan): "raise" a ValueError that names the axis, the value and the limits; "nan", with
+    the reason in the status; or "solve" them directly. Nothing is ever extrapolated. A cable no longer than lambda_cn
+    has no n-th transition: the answer is nan, its status NO_TRANSITION.
+    """
+
+    def __init__(self, path: Path):
+        data, self.sha256 = read_sealed(path)
+        self.path = path
+        try:
+            self._file = netCDF4.Dataset(path.name, memory=data)
+        except (OSError, RuntimeError) as error:
+            raise AtlasFileError(f"{path} is not a readable NetCDF-4 file: {error}") from None
+        self._file.set_auto_mask(False)
+        self.attributes: dict[str, Any] = {name: self._file.getncattr(name) for name in self._file.ncattrs()}
+        version = self.attributes.get("schema_version")
+        if version is None:
+            raise AtlasFileError(f"{path} is not an atlas: it has no schema_version")
+        if version > SCHEMA_VERSION:
+            raise AtlasFileError(
+                f"{path} has schema version {version}, this towatlas reads up to {SCHEMA_VERSION}; upgrade towatlas"
+            )
+        try:
+            self._group = self._file[INTERPOLANT]
+        except (IndexError, KeyError):
+            raise AtlasFileError(
+                f"{path} was built with --method {self.attributes.get('method')} and holds a plain table only; "
+                "lookup needs an atlas built with --method fold"
+            ) from None
+        self.axes = interpolant.Axes(
+            excess_min=float(self._group.excess_min),
+            excess_max=float(self._group.excess_max),
+            w_f_max=float(self._group.w_f_max),
+        )
+        self.n_max = int(self._file.dimensions["n"].size)
+        self._series: dict[str, Array] = {}
+
+    def _coefficients(self, name: str) -> Array:
+        if name not in self._series:
+            self._series[name] = np.asarray(self._group[f"{name}_series"][:], dtype=np.float64)
+        return self._series[name]
+
+    @cached_property
+    def _error_map(self) -> Array:
+        return np.asarray(self._group["gamma_error"][:], dtype=np.float64)
+
+    def states(self, lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1, outside: str = "raise") -> CriticalStates:
+        """All quantities of the critical states, with error estimate and status; see the class for the parameters."""
+        check_outside(outside)
+        lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
+        flat = n.ravel(), w_f.ravel(), lam.ravel()
+        table = self._answer(*flat, outside)
+        return CriticalStates(
+            n=n, lam=lam, w_f=w_f, **{name: column.reshape(n.shape) for name, column in table.items()}
+        )
+
+    def critical_speed(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Critical speed gamma_cn = Omega sqrt(R/g) [-]; relative error estimate: `error`."""
+        return self._quantity("gamma", lam, w_f, n, outside)
+
+    def reaction(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Radial reaction at the tow point R_x0^cn [-], over (mu + rho A) g R; negative."""
+        return self._quantity("R_x0", lam, w_f, n, outside)
+
+    def fish_offset(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Radial position of the fish x_f [-], over the tow radius."""
+        return self._quantity("x_f", lam, w_f, n, outside)
+
+    def fish_depth(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Depth of the fish z_f [-], over the tow radius."""
+        return self._quantity("z_f", lam, w_f, n, outside)
+
+    def tow_tension(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Cable tension at the tow point [-], over (mu + rho A) g R."""
+        return self._quantity("tension", lam, w_f, n, outside)
+
+    def error(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Estimated relative error of the critical speed [-]."""
+        return self._quantity("error", lam, w_f, n, outside)
+
+    def status(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Status codes, `kernels.status`."""
+        return self._quantity("status", lam, w_f, n, outside)
+
+    def _quantity(self, name: str, lam: Any, w_f: Any, n: Any, outside: str) -> Any:
+        def plain(lam: Any, w_f: Any, n: Any) -> Any:
+            return getattr(self.states(lam, w_f, n, outside), name)[()]
+
+        return _with_xarray(plain, name, lam, w_f, n)
+
+    def _answer(self, n: NDArray[np.int64], w_f: Array, lam: Array, outside: str) -> dict[str, NDArray[Any]]:
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            excess = excess_length(lam, w_f, n)
+            sound = np.isfinite(lam) & np.isfinite(w_f) & (lam > 0.0) & (w_f >= 0.0)
+            absent = sound & (excess <= 0.0)
+            inside = sound & ~absent & self.axes.holds(excess, w_f) & (n <= self.n_max)
+        codes = np.full(len(n), status.OUTSIDE, np.int8)
+        codes[~np.isfinite(lam) | ~np.isfinite(w_f)] = status.NOT_A_NUMBER
+        codes[absent] = status.NO_TRANSITION
+        codes[inside] = status.OK
+        unanswered = ~(inside | absent)
+        if outside == "raise" and unanswered.any():
+            raise ValueError(self._complaint(n, w_f, lam, unanswered))
+        table: dict[str, NDArray[Any]] = {
+            name: np.full(len(n), np.nan) for name in ("gamma", "R_x0", "x_f", "z_f", "tension", "error")
+        }
+        self._interpolate(table, inside, n, w_f, lam, excess)
+        table["status"] = codes
+        again = unanswered & sound
+        if outside == "solve" and again.any():
+            solved = solve_rows(n[again], w_f[again], lam[again], excess[again])
+            for name, column in solved.items():
+                table[name][again] = column
+        return table
+
+    def _interpolate(
+        self,
+        table: dict[str, NDArray[Any]],
+        inside: NDArray[np.bool_],
+        n: NDArray[np.int64],
+        w_f: Array,
+        lam: Array,
+        excess: Array,
+    ) -> None:
+        n, w_f, lam, excess = n[inside], w_f[inside], lam[inside], excess[inside]
+        if not len(n):
+            return
+        x, y = self.axes.x(excess), self.axes.y(w_f)
+        for name in interpolant.FIELDS:
+            field = interpolant.evaluate(self._coefficients(name), n, x, y)
+            table[name][inside] = interpolant.from_field(name, field, excess, n)
+        table["tension"][inside] = np.hypot(w_f + lam, table["R_x0"][inside])
+        blocks = self._error_map.shape[1:]
+        at = [
+            np.minimum((0.5 * (c + 1.0) * count).astype(int), count - 1)
+            for c, count in zip((y, x), blocks, strict=True)
+        ]
+        table["error"][inside] = self._error_map[n - 1, at[0], at[1]] + ROUNDINGS * EPS * (1.0 + lam / excess)
+
+    def _complaint(self, n: NDArray[np.int64], w_f: Array, lam: Array, bad: NDArray[np.bool_]) -> str:
+        """What is wrong with the first unanswered point, and how many there are."""
+        i = int(np.flatnonzero(bad)[0])
+        axes = self.axes
+        if np.isnan(lam[i]) or np.isnan(w_f[i]):
+            reason = f"{'lam' if np.isnan(lam[i]) else 'w_f'} is nan"
+        elif not lam[i] > 0.0:
+            reason = f"lam = {lam[i]:g} is not positive"
+        elif not 0.0 <= w_f[i] <= axes.w_f_max:
+            reason = f"w_f = {w_f[i]:g} is outside the atlas, 0 to {axes.w_f_max:g}"
+        elif n[i] > self.n_max:
+            reason = f"n = {n[i]} is outside the atlas, 1 to {self.n_max}"
+        else:
+            threshold = float(threshold_length(w_f[i], n[i]))
+            reason = (
+                f"lam = {lam[i]:.15g} is outside the atlas: for n = {n[i]}, w_f = {w_f[i]:g} it holds lam from "
+                f"{threshold + axes.excess_min:.10g} to {threshold + axes.excess_max:.10g}"
+            )
+        others = f" ({bad.sum()} of {len(bad)} points are outside)" if len(bad) > 1 else ""
+        return f'{reason}{others}; outside="solve" computes such points directly, outside="nan" leaves them out'
+
+
+def _with_xarray(plain: Callable, name: str, lam: Any, w_f: Any, n: Any) -> Any:
+    """Apply a function of arrays to arguments some of which may be xarray objects; then the result is one too."""
+    # Whoever passes an xarray object has imported xarray: no need to import it to find out.
+    xarray = sys.modules.get("xarray")
+    if xarray is None or not any(isinstance(value, xarray.DataArray | xarray.Variable) for value in (lam, w_f, n)):
+        return plain(lam, w_f, n)
+    result = xarray.apply_ufunc(plain, lam, w_f, n)
+    symbol = SYMBOLS[name]
+    result.name = symbol.name if isinstance(result, xarray.DataArray) else None
+    result.attrs = {"long_name": symbol.long_name, "units": "1"}
+    return result

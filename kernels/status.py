@@ -1,0 +1,29 @@
+"""Outcome codes of a computation, with the sentence a user reads for each.
+
+Codes are stored in files as int8: never renumber, only append.
+"""
+
+OK = 0
+NO_TRANSITION = 1
+STEP_LIMIT = 2
+NOT_CONVERGED = 3
+OUTSIDE = 4
+NOT_FOUND = 5
+NOT_A_NUMBER = 6
+LOST_IN_ROUNDING = 7
+
+SENTENCES = {
+    OK: "computed",
+    NO_TRANSITION: "no such transition: the cable is not longer than lambda_cn",
+    STEP_LIMIT: "a shot needed more steps than allowed; raise max_steps",
+    NOT_CONVERGED: "the direct solver did not converge; please report the inputs",
+    OUTSIDE: "outside the range of the atlas; ask for the direct solver",
+    NOT_FOUND: "the scan found no such transition up to its highest speed",
+    NOT_A_NUMBER: "an input is not a finite number, or so large that the arithmetic overflows",
+    LOST_IN_ROUNDING: "lambda is so close to lambda_cn that rounding leaves no digit of the answer",
+}
+
+# Names for CF flag_meanings: one word each, in the order of the codes.
+FLAG_MEANINGS = (
+    "computed no_transition step_limit not_converged outside_atlas not_found_by_scan not_a_number lost_in_rounding"
+)

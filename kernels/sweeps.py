@@ -1,0 +1,64 @@
+"""The parallel builds: each is the serial kernel of its name over blocks of rows, on all of numba's threads.
+
+Every row is written by index and computed the same way wherever it falls, so the results are identical to the last
+bit for any number of threads. One parallel call costs about a millisecond: for a few rows call the serial kernel.
+"""
+
+import numba
+
+from kernels.compiling import parallel_kernel
+from kernels.extract import solve_folds
+from kernels.scan import forward_shots, scan_system
+from kernels.shots import march
+
+# Rows a block: enough to keep the lanes full, few enough to share the work out evenly.
+SHOTS_BLOCK = 256
+FOLDS_BLOCK = 128
+FORWARD_BLOCK = 1024
+
+
+def _march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts, statuses):
+    rows = len(a)
+    for block in numba.prange((rows + SHOTS_BLOCK - 1) // SHOTS_BLOCK):
+        begin = block * SHOTS_BLOCK
+        stop = min(rows, begin + SHOTS_BLOCK)
+        march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts, statuses, begin, stop)
+
+
+def _solve_folds(n, w_f, lam, excess, a, gamma, results, error, statuses):
+    rows = len(n)
+    for block in numba.prange((rows + FOLDS_BLOCK - 1) // FOLDS_BLOCK):
+        begin = block * FOLDS_BLOCK
+        stop = min(rows, begin + FOLDS_BLOCK)
+        solve_folds(n, w_f, lam, excess, a, gamma, results, error, statuses, begin, stop)
+
+
+def _forward_shots(w_f, lam, gamma, r_x0, segments, errors, x_end, r_x_end):
+    rows = len(w_f)
+    for block in numba.prange((rows + FORWARD_BLOCK - 1) // FORWARD_BLOCK):
+        begin = block * FORWARD_BLOCK
+        stop = min(rows, begin + FORWARD_BLOCK)
+        forward_shots(w_f, lam, gamma, r_x0, segments, errors, x_end, r_x_end, begin, stop)
+
+
+def _scan_systems(w_f, lam, gamma_low, gamma_high, speeds, guesses, segments, n_max, tolerance, results, statuses):
+    for row in numba.prange(len(w_f)):
+        scan_system(
+            w_f[row],
+            lam[row],
+            gamma_low[row],
+            gamma_high[row],
+            speeds,
+            guesses,
+            segments,
+            n_max,
+            tolerance,
+            results[row],
+            statuses[row],
+        )
+
+
+march_parallel = parallel_kernel(_march)
+solve_folds_parallel = parallel_kernel(_solve_folds)
+forward_shots_parallel = parallel_kernel(_forward_shots)
+scan_systems_parallel = parallel_kernel(_scan_systems)

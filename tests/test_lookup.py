@@ -1,0 +1,158 @@
+"""Answers from the atlas: accuracy against the direct solver, what is outside, types, what gets imported."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+from helpers import random_cables
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import atlas
+from atlas import lookup
+from atlas.limits import threshold_length
+from kernels import extract, status
+
+QUANTITIES = ("gamma", "R_x0", "x_f", "z_f", "tension")
+METHODS = ("critical_speed", "reaction", "fish_offset", "fish_depth", "tow_tension", "error", "status")
+FIXTURE = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+
+
+def test_lookup_is_the_direct_solution_everywhere(atlas_file):
+    n, w_f, lam = random_cables(30000, 5)
+    found, exact = atlas_file.states(lam, w_f, n), atlas.solve_critical(lam, w_f, n)
+    for name in QUANTITIES:
+        miss = np.abs(getattr(found, name) / getattr(exact, name) - 1)
+        assert miss.max() < 1e-8, name
+        assert miss.max() < 1e-9, name
+    miss = np.abs(found.gamma / exact.gamma - 1)
+    assert (miss <= found.error + exact.error).all()
+    assert np.median(found.error) < 1e-10
+
+
+def test_edges_and_corners_of_the_domain(atlas_file):
+    for n in (1, 6):
+        for w_f in (0.0, 1e-300, 1e-12, 1e4):
+            lam = threshold_length(w_f, n) + np.array([1e-3, 1e3])
+            found = atlas_file.states(lam, w_f, n)
+            exact = atlas.solve_critical(lam, w_f, n)
+            assert set(found.status) == {status.OK}
+            assert found.gamma == pytest.approx(exact.gamma, rel=1e-9)
+
+
+def test_error_constants_agree():
+    assert lookup.ROUNDINGS == extract.ROUNDINGS
+
+
+def test_no_transition_is_an_answer(atlas_file):
+    states = atlas_file.states([1.9, 2.0, 3.0], 0.0, 1)
+    assert list(states.status) == [status.NO_TRANSITION, status.NO_TRANSITION, status.OK]
+    assert np.isnan(states.gamma[:2]).all()
+    assert states.sentence(0).startswith("no such transition")
+    assert np.isnan(atlas_file.critical_speed(1.5, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("lam", "w_f", "n", "match"),
+    [
+        (2.0005, 0.0, 1, r"lam = 2\.0005.* n = 1, w_f = 0 it holds lam from 2\.001 to 1002"),
+        (1500.0, 0.0, 1, "lam = 1500 is outside"),
+        (10.0, 2e4, 1, "w_f = 20000 is outside the atlas, 0 to 10000"),
+        (100.0, 0.0, 7, "n = 7 is outside the atlas, 1 to 6"),
+        (np.nan, 0.0, 1, "lam is nan"),
+        (10.0, np.nan, 1, "w_f is nan"),
+        (np.inf, 0.0, 1, "lam = inf is outside"),
+        (10.0, np.inf, 1, "w_f = inf is outside"),
+        (0.0, 0.0, 1, "lam = 0 is not positive"),
+        (-3.0, 0.0, 1, "lam = -3 is not positive"),
+        (10.0, -1.0, 1, "w_f = -1 is outside"),
+        (10.0, 0.0, 0, "n counts the transitions"),
+        (10.0, 0.0, 1.5, "n counts the transitions"),
+        (None, 0.0, 1, "lam must be a real number"),
+        ("10", 0.0, 1, "lam must be a real number"),
+        (10.0, 1j, 1, "w_f must be a real number"),
+        ([10.0, 11.0], [1.0, 2.0, 3.0], 1, "do not broadcast"),
+    ],
+)
+def test_bad_input_raises(atlas_file, lam, w_f, n, match):
+    with pytest.raises(ValueError, match=match):
+        atlas_file.critical_speed(lam, w_f, n)
+
+
+def test_unknown_choice_for_outside(atlas_file):
+    with pytest.raises(ValueError, match="outside must be one of raise, nan, solve"):
+        atlas_file.critical_speed(10.0, 0.0, 1, outside="extrapolate")
+
+
+def test_one_bad_point_spoils_no_other(atlas_file):
+    n, w_f, lam = random_cables(20000, 9)
+    good = atlas_file.critical_speed(lam, w_f, n)
+    for bad, code in ((np.nan, status.NOT_A_NUMBER), (-1.0, status.OUTSIDE), (1e9, status.OUTSIDE)):
+        spoiled = lam.copy()
+        spoiled[777] = bad
+        for choice in ("nan", "solve"):
+            states = atlas_file.states(spoiled, w_f, n, outside=choice)
+            # To rounding: a matrix product may add up in another order.
+            assert np.delete(states.gamma, 777) == pytest.approx(np.delete(good, 777), rel=1e-14)
+            if choice == "nan":
+                assert np.isnan(states.gamma[777])
+                assert states.status[777] == code
+        with pytest.raises(ValueError, match="1 of 20000 points are outside"):
+            atlas_file.critical_speed(spoiled, w_f, n)
+
+
+def test_outside_solve_is_the_direct_solver(atlas_file):
+    lam, w_f, n = np.array([2.0000001, 5000.0, 10.0, 50.0]), np.array([0.0, 3.0, 5e5, 0.0]), np.array([1, 2, 1, 9])
+    found, exact = atlas_file.states(lam, w_f, n, outside="solve"), atlas.solve_critical(lam, w_f, n)
+    for name in (*QUANTITIES, "error", "status"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(exact, name))
+
+
+def test_types_and_shapes(atlas_file):
+    value = atlas_file.critical_speed(10.0, 1.0, 1)
+    assert isinstance(value, float)
+    assert atlas_file.critical_speed(np.int64(10), 1, np.int8(1)) == value
+    assert atlas_file.critical_speed(np.float32(10), np.float32(1)) == value
+    assert atlas_file.critical_speed(10, 1, 1.0) == value
+    grid = atlas_file.critical_speed(np.array([5.0, 10.0])[:, None], [0, 1, 2], 1)
+    assert grid.shape == (2, 3)
+    assert grid[1, 1] == pytest.approx(value, rel=1e-15)
+    assert atlas_file.critical_speed([], 1.0).shape == (0,)
+    for name in METHODS:
+        assert np.shape(getattr(atlas_file, name)([10.0, 20.0], 1.0)) == (2,)
+
+
+def test_xarray_in_and_out(atlas_file):
+    lam = xr.DataArray([5.0, 10.0], dims="cable", coords={"cable": ["short", "long"]})
+    w_f = xr.DataArray([0.0, 1.0, 2.0], dims="fish")
+    gamma = atlas_file.critical_speed(lam, w_f, 2)
+    assert gamma.dims == ("cable", "fish")
+    assert gamma.attrs["units"] == "1"
+    assert gamma.name == "gamma"
+    assert float(gamma.sel(cable="long")[1]) == pytest.approx(atlas_file.critical_speed(10.0, 1.0, 2), rel=1e-14)
+
+
+@FIXTURE
+@given(lam=st.floats(allow_nan=True), w_f=st.floats(allow_nan=True), n=st.integers(1, 8))
+def test_any_float_gets_a_value_or_a_reason(atlas_file, lam, w_f, n):
+    states = atlas_file.states(lam, w_f, n, outside="nan")
+    if states.status == status.OK:
+        exact = atlas.solve_critical(lam, w_f, n)
+        assert states.gamma == pytest.approx(float(exact.gamma), rel=1e-9)
+    else:
+        assert np.isnan(states.gamma)
+        if states.status != status.NO_TRANSITION:
+            with pytest.raises(ValueError, match=r"outside|nan|positive"):
+                atlas_file.critical_speed(lam, w_f, n)
+
+
+def test_lookup_imports_nothing_heavy(atlas_path):
+    code = (
+        "import sys, atlas\n"
+        f"print(atlas.open_atlas({str(atlas_path)!r}).critical_speed([5.0, 10.0], 0.0, 1))\n"
+        "print([m for m in ('numba', 'xarray', 'matplotlib', 'scipy', 'pandas', 'tqdm') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
