@@ -39,10 +39,8 @@ def methods_table(rows: list[Row]) -> str:
 
 
 def _time(value: float) -> str:
-    for unit, size in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
-        if value >= size:
-            return f"{value / size:.2g} {unit}"
-    return f"{value / 1e-9:.2g} ns"
+    unit, size = next((u for u in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)) if value >= u[1]), ("ns", 1e-9))
+    return f"{value / size:.0f} {unit}" if value >= 10 * size else f"{value / size:.1f} {unit}"
 
 
 def main() -> None:
