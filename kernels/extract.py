@@ -9,7 +9,9 @@ from kernels.compiling import helper, inlined, kernel
 from kernels.shots import END_COLUMNS, FOLD_COLUMNS, march
 
 EPS = 2.0**-52
-DIFFERENCE = 1e-6  # step of the finite-difference Jacobian in log a and log gamma
+# Step of the finite-difference Jacobian in log a and log gamma, where rounding is all that disturbs it; where lambda
+# leaves little of the excess length, the root of what it leaves.
+DIFFERENCE = 1e-6
 ROUNDS = 60
 RETREATS = 20
 MAX_STEPS = 10**7
@@ -18,6 +20,8 @@ NEAR = 0.05
 # The error estimate in units of rounding, of 1 and of lambda over the excess length. Measured: below 6 against 34
 # digits, 12 between two solutions from different guesses on long cables.
 ROUNDINGS = 24.0
+# An answer whose estimated error is above this is not given.
+WORTHLESS = 1e-4
 # A step this small that no longer shrinks is rounding noise.
 NOISE = 1e-9
 
@@ -105,6 +109,8 @@ def solve_folds(n, w_f, lam, excess, a, gamma, results, error, statuses, begin, 
     fresh = np.ones(rows, np.bool_)
     active = np.zeros(rows, np.bool_)
     retreats = np.zeros(rows, np.int64)
+    rounding = np.zeros(rows)
+    difference = np.zeros(rows)
 
     for k in range(rows):
         i = begin + k
@@ -114,11 +120,13 @@ def solve_folds(n, w_f, lam, excess, a, gamma, results, error, statuses, begin, 
             statuses[i] = status.NOT_A_NUMBER
         elif not excess[i] > 0.0:
             statuses[i] = status.NO_TRANSITION
-        elif excess[i] < 8.0 * EPS * lam[i]:
+        elif ROUNDINGS * EPS * (1.0 + lam[i] / excess[i]) > WORTHLESS:
             statuses[i] = status.LOST_IN_ROUNDING
         else:
             statuses[i] = status.NOT_CONVERGED
             active[k] = True
+            rounding[k] = EPS * (1.0 + lam[i] / excess[i])
+            difference[k] = DIFFERENCE + sqrt(rounding[k])
             if gamma[i] > 0.0:
                 x[k, 0], x[k, 1] = log(a[i]), log(gamma[i])
             else:
@@ -130,8 +138,8 @@ def solve_folds(n, w_f, lam, excess, a, gamma, results, error, statuses, begin, 
             if active[k]:
                 first[k] = jobs
                 for variant in range(3 if fresh[k] else 1):
-                    job_a[jobs] = exp(x[k, 0] + (DIFFERENCE if variant == 1 else 0.0))
-                    job_mu[jobs] = w_f[begin + k] * exp(2.0 * (x[k, 1] + (DIFFERENCE if variant == 2 else 0.0)))
+                    job_a[jobs] = exp(x[k, 0] + (difference[k] if variant == 1 else 0.0))
+                    job_mu[jobs] = w_f[begin + k] * exp(2.0 * (x[k, 1] + (difference[k] if variant == 2 else 0.0)))
                     job_n[jobs] = n[begin + k]
                     jobs += 1
         if jobs == 0:
@@ -159,18 +167,19 @@ def solve_folds(n, w_f, lam, excess, a, gamma, results, error, statuses, begin, 
             miss0, miss1 = _residual(fold, job_mu[j], x[k, 1], excess[i], n[i])
             if fresh[k]:
                 for column in range(2):
-                    log_gamma = x[k, 1] + (DIFFERENCE if column == 1 else 0.0)
+                    log_gamma = x[k, 1] + (difference[k] if column == 1 else 0.0)
                     near0, near1 = _residual(
                         folds[j + 1 + column, 0], job_mu[j + 1 + column], log_gamma, excess[i], n[i]
                     )
-                    jac[k, 0, column] = (near0 - miss0) / DIFFERENCE
-                    jac[k, 1, column] = (near1 - miss1) / DIFFERENCE
+                    jac[k, 0, column] = (near0 - miss0) / difference[k]
+                    jac[k, 1, column] = (near1 - miss1) / difference[k]
             else:
                 _broyden(jac[k], step[k], miss0, miss1, before[k])
             step[k, 0], step[k, 1] = _newton_step(jac[k], miss0, miss1)
             new_size = max(abs(step[k, 0]), abs(step[k, 1]))
-            rounding = EPS * (1.0 + lam[i] / excess[i])
-            if new_size <= 8.0 * rounding or (new_size < NOISE and not fresh[k] and new_size > 0.5 * size[k]):
+            if new_size <= 8.0 * rounding[k] or (
+                new_size < NOISE + 100.0 * rounding[k] and not fresh[k] and new_size > 0.5 * size[k]
+            ):
                 p = abs(fold[2])
                 sign = 1.0 if n[i] % 2 == 0 else -1.0
                 a[i] = job_a[j]
@@ -179,7 +188,7 @@ def solve_folds(n, w_f, lam, excess, a, gamma, results, error, statuses, begin, 
                 results[i, 1] = sign * fold[1] / p
                 results[i, 2] = sign * job_a[j] / p
                 results[i, 3] = fold[3] / p
-                error[i] = abs(step[k, 1]) + ROUNDINGS * rounding
+                error[i] = abs(step[k, 1]) + ROUNDINGS * rounding[k]
                 statuses[i] = status.OK
                 active[k] = False
                 continue

@@ -32,9 +32,9 @@ LANE_ROWS = 4 * ROWS + 9
 JOB, MODE, COUNT, BASE_COUNT, LANDINGS = range(5)
 BOOK_ROWS = 5
 
-# A forced step below this fraction of the overshooting step is taken as a first-order correction: its second order is
+# A forced step below this fraction of the overshooting step is taken as a second-order correction: its third order is
 # below rounding.
-LANDED = 1e-8
+LANDED = 1e-5
 LANDING_LIMIT = 40
 
 # Columns of the results.
@@ -128,7 +128,7 @@ def _hermite_root(g0, d0, dd0, g1, d1, dd1, h):
     c5 = 6.0 * rise - 3.0 * slope + 0.5 * curve
     low, high = 0.0, 1.0
     s = g0 / (g0 - g1)
-    for _ in range(8):
+    for _ in range(6):
         g = g0 + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
         d = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))
         if (g < 0.0) == (g0 < 0.0):
@@ -138,7 +138,7 @@ def _hermite_root(g0, d0, dd0, g1, d1, dd1, h):
         s_new = s - g / d
         if not (low < s_new < high):
             s_new = 0.5 * (low + high)
-        if abs(s_new - s) < 1e-7:
+        if abs(s_new - s) < 1e-4:
             return s_new * h
         s = s_new
     return s * h
@@ -228,7 +228,7 @@ def _begin_landing(lanes, book, lane, mode):
 
 @inlined
 def _after_landing_step(lanes, book, lane):
-    """Take the forced step just made; returns whether the target is within a first-order correction, and that."""
+    """Take the forced step just made; returns whether the target is within a last correction, and that."""
     lanes[OFFSET, lane] += lanes[H, lane]
     book[LANDINGS, lane] += 1
     if book[MODE, lane] == TO_FOLD:
@@ -255,17 +255,19 @@ def _after_landing_step(lanes, book, lane):
 
 @inlined
 def _correct(lanes, lane, d):
-    """First-order step of length d in sigma, on the state a landing has reached."""
+    """Second-order step of length d in sigma, on the state a landing has reached."""
     t = _time(lanes, NOW, lane)
     f, p, v, q = lanes[F, lane], lanes[P, lane], lanes[V, lane], lanes[Q, lane]
-    r = tension(t, f)
-    lanes[TAU, lane] += lanes[TAU_LOW, lane] + r * d
+    r, dr = _t_slopes(lanes, NOW, lane)
+    dq, ddq = _q_slopes(lanes, NOW, lane)
+    half = 0.5 * d
+    lanes[TAU, lane] += lanes[TAU_LOW, lane] + d * (r + half * dr)
     lanes[TAU_LOW, lane] = 0.0
-    lanes[F, lane] = f + p * r * d
-    lanes[P, lane] = p - f * d
-    lanes[Z, lane] += t * d
-    lanes[V, lane] = v + q * r * d
-    lanes[Q, lane] = q - (t / r) ** 2 * v * d
+    lanes[F, lane] = f + d * (p * r + half * (p * dr - f * r))
+    lanes[P, lane] = p - d * (f + half * p * r)
+    lanes[Z, lane] += d * (t + half * r)
+    lanes[V, lane] = v + d * (q * r + half * (q * dr + dq * r))
+    lanes[Q, lane] = q + d * (dq + half * ddq)
 
 
 @inlined

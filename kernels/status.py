@@ -20,7 +20,7 @@ SENTENCES = {
     OUTSIDE: "outside the range of the atlas; ask for the direct solver",
     NOT_FOUND: "the scan found no such transition up to its highest speed",
     NOT_A_NUMBER: "an input is not a finite number, or so large that the arithmetic overflows",
-    LOST_IN_ROUNDING: "lambda is so close to lambda_cn that rounding leaves no digit of the answer",
+    LOST_IN_ROUNDING: "lambda is so close to lambda_cn that rounding leaves fewer than four digits of the answer",
 }
 
 # Names for CF flag_meanings: one word each, in the order of the codes.

@@ -54,14 +54,14 @@ def _inverse_sqrt(x):
 
 
 def _convolution(a: str, b: str, k: int) -> str:
-    return " + ".join(f"{a}{j} * {b}{k - j}" for j in range(k + 1))
+    # Oldest coefficients first: the sum is a chain of dependent additions, and the newest coefficient, ready last,
+    # must not hold up the rest of it.
+    return " + ".join(f"{a}{j} * {b}{k - j}" for j in sorted(range(k + 1), key=lambda j: max(j, k - j)))
 
 
 def _half_square(a: str, k: int) -> str:
-    terms = [f"{a}{j} * {a}{k - j}" for j in range((k + 1) // 2)]
-    if k % 2 == 0:
-        terms.append(f"0.5 * {a}{k // 2} * {a}{k // 2}")
-    return " + ".join(terms)
+    terms = [f"0.5 * {a}{k // 2} * {a}{k // 2}"] if k % 2 == 0 else []
+    return " + ".join(terms + [f"{a}{j} * {a}{k - j}" for j in range((k - 1) // 2, -1, -1)])
 
 
 def _horner(coefficients: list[str], variable: str) -> str:

@@ -133,6 +133,25 @@ def test_threshold_is_approached_as_an_inverse_square_root(n, w_f):
     assert abs(k[0] / k[1] - 1) < abs(k[1] / k[2] - 1) + states["error"].sum()
 
 
+def test_ever_closer_to_the_threshold():
+    """Down to where rounding of lambda leaves four digits there is an answer as good as estimated; then a reason."""
+    rng = np.random.default_rng(0)
+    rows = 4000
+    n, excess = rng.integers(1, 9, rows), 10 ** rng.uniform(-16, -3, rows)
+    w_f = np.where(rng.random(rows) < 0.2, 0.0, 10 ** rng.uniform(-6, 4, rows))
+    lam = threshold_length(w_f, n) + excess
+    states = atlas.solve_critical(lam, w_f, n)
+    assert set(states.status) == {status.OK, status.NO_TRANSITION, status.LOST_IN_ROUNDING}
+    solved = states.status == status.OK
+    assert (solved | (excess < 1e-10 * lam)).all()
+    assert states.error[solved].max() < 2e-4
+    # gamma sqrt(excess) is nearly constant there: its scatter between neighbours is the error.
+    nearby = atlas.solve_critical(lam[solved] * (1 + 4e-16), w_f[solved], n[solved])
+    change = nearby.gamma * np.sqrt(excess_length(nearby.lam, nearby.w_f, nearby.n))
+    change /= states.gamma[solved] * np.sqrt(excess_length(lam, w_f, n)[solved])
+    assert (np.abs(change - 1) <= states.error[solved] + nearby.error).all()
+
+
 @pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("w_f", [0.0, 0.1, 10.0])
 def test_no_transition_at_or_below_the_threshold(n, w_f):

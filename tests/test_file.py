@@ -14,7 +14,8 @@ import pytest
 import xarray as xr
 
 import atlas
-from atlas.build import Grid, ScanSettings, build_atlas
+from atlas.build import build_atlas
+from atlas.grids import Grid, ScanSettings
 from atlas.seal import AtlasFileError, read_sealed, write_seal
 from kernels import status
 
