@@ -5,6 +5,7 @@ Importing this package, opening an atlas and looking a value up need numpy and n
 """
 
 from atlas.critical import CriticalStates, solve_critical
+from atlas.equilibria import Equilibria, equilibria
 from atlas.limits import excess_length, massless_cable, threshold_length
 from atlas.lookup import Atlas, open_atlas
 from atlas.seal import AtlasFileError
@@ -14,6 +15,8 @@ __all__ = [
     "Atlas",
     "AtlasFileError",
     "CriticalStates",
+    "Equilibria",
+    "equilibria",
     "excess_length",
     "massless_cable",
     "open_atlas",

@@ -20,8 +20,9 @@ from atlas import interpolant
 from atlas.critical import solve_rows
 from atlas.dataset import WITNESS, plain_table, root_attributes, symbol_attributes, variable, write_atlas
 from atlas.grids import WHOLE_SCAN, Grid, ScanSettings
-from atlas.limits import excess_length, threshold_length
+from atlas.limits import unchecked_excess_length, unchecked_threshold_length
 from atlas.lookup import INTERPOLANT, SCHEMA_VERSION
+from atlas.seal import check_writable
 from kernels import status
 from kernels.compiling import source_hash
 from kernels.sweeps import scan_systems_parallel
@@ -102,6 +103,7 @@ def build_atlas(
     start = time.perf_counter()
     if method not in ("fold", "scan"):
         raise ValueError(f"method must be fold or scan, got {method!r}")
+    check_writable(path)
     grid = grid or Grid()
     scan = scan or (ScanSettings() if method == "fold" else WHOLE_SCAN)
     total = scan.size + (grid.size if method == "fold" else 0)
@@ -164,9 +166,9 @@ def _build_fold(grid: Grid, scan: ScanSettings, bar: tqdm) -> tuple[xr.Dataset, 
     orders = n[:, None, None]
     w_f = grid.w_f[:, None]
     shape = (grid.n_max, len(grid.w_f), len(grid.lam))
-    excess = excess_length(grid.lam, w_f, orders)
+    excess = unchecked_excess_length(grid.lam, w_f, orders)
     table = _solve_grid(shape, bar, "table", n=orders, w_f=w_f, lam=grid.lam, excess=excess)
-    root = plain_table(n, grid.w_f, grid.lam, threshold_length(grid.w_f, n[:, None]), table)
+    root = plain_table(n, grid.w_f, grid.lam, unchecked_threshold_length(grid.w_f, n[:, None]), table)
     groups = {INTERPOLANT: _interpolant_group(axes, series, series_error), WITNESS: _witness(scan, bar)}
 
     solved = table["status"] == status.OK
@@ -176,6 +178,7 @@ def _build_fold(grid: Grid, scan: ScanSettings, bar: tqdm) -> tuple[xr.Dataset, 
     if failed:
         raise RuntimeError(f"{failed} folds of the table did not converge; this is a defect, please report it")
     domain = solved & (excess >= grid.excess_min)
+    nearer = float(np.nanmax(table["error"]))
     worst = np.unravel_index(np.argmax(np.where(domain, table["error"], 0.0)), shape)
     lookup_worst = float(series_error.max())
     difference = np.abs(groups[WITNESS]["difference"].values)
@@ -187,12 +190,13 @@ def _build_fold(grid: Grid, scan: ScanSettings, bar: tqdm) -> tuple[xr.Dataset, 
         "folds": int(solved.sum()) + series["gamma"].size,
         "worst_error": float(table["error"][worst]),
         "worst_at": f"n = {n[worst[0]]}, w_f = {grid.w_f[worst[1]]:g}, lambda = {grid.lam[worst[2]]:g}; "
-        f"between nodes {lookup_worst:.1e}",
+        f"between nodes {lookup_worst:.1e}; nearer the threshold than {grid.excess_min:g}, {nearer:.1e}",
         "witness": f"{found.sum()} folds by scan, largest difference {difference[found].max():.1e}; "
         f"{missed} transitions the scan did not see",
         "attributes": {
             "solver_tolerance": "8 eps (1 + lambda / (lambda - lambda_cn)) in the last step",
             "worst_table_error": float(table["error"][worst]),
+            "worst_table_error_nearer_the_threshold": nearer,
             "worst_lookup_error": lookup_worst,
         },
     }
@@ -212,7 +216,7 @@ def _fit_series(grid: Grid, axes: interpolant.Axes, bar: tqdm) -> tuple[dict[str
     ) -> tuple[dict[str, Array], Array]:
         excess, w_f = axes.excess(x), axes.w_f(y)[:, None]
         shape = (grid.n_max, len(y), len(x))
-        columns = {"n": orders, "w_f": w_f, "lam": threshold_length(w_f, orders) + excess, "excess": excess}
+        columns = {"n": orders, "w_f": w_f, "lam": unchecked_threshold_length(w_f, orders) + excess, "excess": excess}
         solved = _solve_grid(shape, bar, label, guess, **columns)
         if (solved["status"] != status.OK).any():
             raise RuntimeError("a fold inside the domain did not converge; this is a defect, please report it")
@@ -239,7 +243,7 @@ def _interpolant_group(axes: interpolant.Axes, series: dict[str, Array], error_m
     variables: dict[str, xr.Variable] = {}
     for name, values in series.items():
         attributes = symbol_attributes(name) | {
-            "long_name": f"Chebyshev series of the logarithm of {name}, see comment"
+            "long_name": f"Chebyshev series for {name}, see the comment of this group"
         }
         variables[f"{name}_series"] = xr.Variable(dims, values, attributes)
     variables["gamma_error"] = xr.Variable(
@@ -257,9 +261,12 @@ def _interpolant_group(axes: interpolant.Axes, series: dict[str, Array], error_m
             "excess_max": axes.excess_max,
             "w_f_max": axes.w_f_max,
             "w_f_scale": interpolant.W_SCALE,
-            "comment": "x and y in [-1, 1] are linear in log(lam - lambda_c) and in log(1 + w_f / w_f_scale), from "
-            "excess_min to excess_max and from 0 to w_f_max. sum_ij series[n, i, j] T_i(y) T_j(x) is "
-            "log(gamma_c sqrt(lam - lambda_c)), log(-R_x0_c), log(abs(x_f)), log(z_f); x_f has the sign of (-1)^n.",
+            "comment": "Let x be linear in log(lam - lambda_c), from -1 at lam - lambda_c = excess_min to 1 at "
+            "excess_max, and y linear in log(1 + w_f / w_f_scale), from -1 at w_f = 0 to 1 at w_f_max, with the n-th "
+            "lambda_c = 2 n - 1 + 1 / (w_f + sqrt(1 + w_f^2)). With T_k the Chebyshev polynomial cos(k arccos x) and "
+            "i, j from 0, the sum over i and j of series[n, i, j] T_i(y) T_j(x) is log(gamma_c sqrt(lam - lambda_c)), "
+            "log(-R_x0_c), log(abs(x_f)) and log(z_f) for the four series; x_f has the sign of (-1)^n. Not valid "
+            "outside [-1, 1]. Nodes of the plain table closer to the threshold than excess_min lie outside.",
         },
     )
 
@@ -291,7 +298,7 @@ def _scan_grid(scan: ScanSettings, bar: tqdm, label: str) -> tuple[Array, NDArra
             statuses[part],
         )
         bar.update(len(w_f[part]) * scan.n_max)
-    excess = excess_length(lam[:, None], w_f[:, None], np.arange(1, scan.n_max + 1))
+    excess = unchecked_excess_length(lam[:, None], w_f[:, None], np.arange(1, scan.n_max + 1))
     statuses[(excess <= 0.0) & (statuses == status.NOT_FOUND)] = status.NO_TRANSITION
     return results.reshape(*shape, scan.n_max, 4), statuses.reshape(*shape, scan.n_max).astype(np.int8)
 
@@ -304,7 +311,7 @@ def _witness(scan: ScanSettings, bar: tqdm) -> xr.Dataset:
     orders = np.broadcast_to(n[:, None, None], shape)
     w_f, lam = (np.broadcast_to(a, shape) for a in (scan.w_f[:, None], scan.lam))
     flat = orders.ravel(), w_f.ravel(), lam.ravel()
-    direct = solve_rows(*flat, excess_length(flat[2], flat[1], flat[0]))
+    direct = solve_rows(*flat, unchecked_excess_length(flat[2], flat[1], flat[0]))
     gamma = direct["gamma"].reshape(shape)
     missed = (statuses != status.OK) & (gamma < scan.gamma_max)
     # Names of their own: a reader that merges the groups must not take these axes for those of the table.
@@ -314,8 +321,12 @@ def _witness(scan: ScanSettings, bar: tqdm) -> xr.Dataset:
         {
             "gamma_scan": variable(dims, "gamma", results[..., 0]),
             "R_x0_scan": variable(dims, "R_x0", results[..., 1]),
-            "gamma_resolution": xr.Variable(dims, results[..., 2], {"long_name": "resolution of gamma_scan"} | one),
-            "R_x0_resolution": xr.Variable(dims, results[..., 3], {"long_name": "resolution of R_x0_scan"} | one),
+            "gamma_resolution": xr.Variable(
+                dims, results[..., 2], {"long_name": "absolute resolution of gamma_scan"} | one
+            ),
+            "R_x0_resolution": xr.Variable(
+                dims, results[..., 3], {"long_name": "absolute resolution of R_x0_scan"} | one
+            ),
             "difference": xr.Variable(
                 dims, results[..., 0] / gamma - 1.0, {"long_name": "gamma_scan over the direct solution, minus 1"} | one
             ),
@@ -346,7 +357,7 @@ def _build_scan(scan: ScanSettings, bar: tqdm) -> tuple[xr.Dataset, dict[str, xr
         "error": results[..., 2] / results[..., 0],
         "status": statuses,
     }
-    root = plain_table(n, scan.w_f, scan.lam, threshold_length(scan.w_f, n[:, None]), table)
+    root = plain_table(n, scan.w_f, scan.lam, unchecked_threshold_length(scan.w_f, n[:, None]), table)
     found = statuses == status.OK
     worst = np.unravel_index(np.argmax(np.where(found, table["error"], 0.0)), found.shape)
     facts: dict[str, Any] = {

@@ -8,15 +8,27 @@ from numpy.typing import NDArray
 OUTSIDE_CHOICES = ("raise", "nan", "solve")
 
 
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
 def check_real(name: str, value: Any) -> NDArray[np.float64]:
-    """Real numbers of any numeric dtype, as float64."""
+    """Real numbers of any numeric dtype, as float64; masked values become nan."""
+    if hasattr(value, "dims"):
+        raise ValueError(
+            f"{name} is a labelled {type(value).__name__}; this function pairs by position and takes plain arrays: "
+            f"pass {name}.values, or a DataArray to the methods of an atlas that return one quantity"
+        )
+    if isinstance(value, np.ma.MaskedArray):
+        value = np.ma.filled(value.astype(float), np.nan)
     try:
         array = np.asarray(value)
     except ValueError as error:
         raise ValueError(f"{name} must be a number or an array of numbers: {error}") from None
     if array.dtype.kind not in "iuf":
         raise ValueError(
-            f"{name} must be a real number or an array of them, got {value!r} ({array.dtype}); convert it first"
+            f"{name} must be a real number or an array of them, got {_short(value)} ({array.dtype}); convert it first"
         )
     return array.astype(np.float64)
 
@@ -41,8 +53,8 @@ def check_broadcast(**arrays: NDArray) -> list[NDArray]:
 
 def check_outside(choice: str) -> str:
     """What to do with points outside the atlas."""
-    if choice not in OUTSIDE_CHOICES:
-        raise ValueError(f"outside must be one of {', '.join(OUTSIDE_CHOICES)}; got {choice!r}")
+    if not isinstance(choice, str) or choice not in OUTSIDE_CHOICES:
+        raise ValueError(f"outside must be one of {', '.join(OUTSIDE_CHOICES)}; got {_short(choice)}")
     return choice
 
 
@@ -54,3 +66,12 @@ def check_positive_finite(name: str, array: NDArray[np.float64], *, zero: bool =
         raise ValueError(
             f"{name} must be {rule}, got {array[~good].flat[0]:g} ({np.sum(~good)} of {array.size} values)"
         )
+
+
+def check_one(name: str, value: Any, *, zero: bool = False) -> float:
+    """One finite number above zero (or zero itself, where that is allowed)."""
+    array = check_real(name, value)
+    if array.ndim:
+        raise ValueError(f"{name} must be one number, got an array of shape {array.shape}; call once for each")
+    check_positive_finite(name, array, zero=zero)
+    return float(array)

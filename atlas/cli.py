@@ -1,11 +1,13 @@
 """The command line: `towatlas`, or `python -m atlas`.
 
-Exit codes: 0 ok, 2 usage, 3 outside the atlas, 4 no such state, 5 a file that cannot be read or written.
+Exit codes: 0 ok, 1 the computation failed, 2 usage, 3 outside the atlas, 4 no such state, 5 a file that cannot be read
+or written.
 """
 
 import argparse
 import json
 import math
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,16 +16,18 @@ import numpy as np
 
 from atlas import __version__
 from atlas.critical import CriticalStates, solve_critical
-from atlas.limits import threshold_length, threshold_offset
-from atlas.lookup import Atlas, default_path, open_atlas
+from atlas.equilibria import equilibria
+from atlas.limits import threshold_offset, unchecked_threshold_length
+from atlas.lookup import Atlas, default_path, open_atlas, read_root
 from atlas.nomenclature import REPORT, SYMBOLS
 from atlas.seal import AtlasFileError
 from kernels import status
 
-OK, USAGE, OUTSIDE, NO_STATE, FILE = 0, 2, 3, 4, 5
+OK, FAILED, USAGE, OUTSIDE, NO_STATE, FILE = 0, 1, 2, 3, 4, 5
 
 # Transitions solved at once when none is named; a cable of 1e4 tow radii has 5000.
 MOST_SOLVED = 1000
+FIGURE_FORMATS = (".svg", ".png", ".pdf")
 
 
 def _number(text: str) -> float:
@@ -40,6 +44,13 @@ def _length(text: str) -> float:
     value = _number(text)
     if value <= 0.0:
         raise argparse.ArgumentTypeError(f"lambda = {text} is not positive")
+    return value
+
+
+def _speed(text: str) -> float:
+    value = _number(text)
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f"gamma = {text} is not positive")
     return value
 
 
@@ -64,7 +75,8 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="towatlas",
         description="Critical speeds of a cable towed in a circle: at what speed does it jump, and to what shape?",
-        epilog="Exit codes: 0 ok, 2 usage, 3 outside the atlas, 4 no such state, 5 unreadable or damaged file.",
+        epilog="Exit codes: 0 ok, 1 computation failed, 2 usage, 3 outside the atlas, 4 no such state, 5 unreadable or "
+        "damaged file.",
     )
     parser.add_argument("--version", action="version", version=f"towatlas {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -85,15 +97,31 @@ def _parser() -> argparse.ArgumentParser:
     critical.add_argument("--json", action="store_true", help="a list of objects instead of a table")
     critical.set_defaults(run=_critical)
 
+    equilibria = commands.add_parser(
+        "equilibria",
+        help="all equilibria of one cable at one speed",
+        description="Every shape in which a cable can be towed at one speed, in rising order of R_x0. boundary_error "
+        "is E of Eq. (33) of a forward Runge-Kutta shot, an independent witness.",
+    )
+    equilibria.add_argument("--lam", type=_length, required=True, metavar="LAMBDA", help=SYMBOLS["lam"].long_name)
+    equilibria.add_argument("--wf", type=_weight, required=True, metavar="W_F", help=SYMBOLS["w_f"].long_name)
+    equilibria.add_argument(
+        "--gamma", type=_speed, required=True, metavar="GAMMA", help="rotational frequency Omega sqrt(R/g)"
+    )
+    equilibria.add_argument("--json", action="store_true", help="a list of objects instead of a table")
+    equilibria.set_defaults(run=_equilibria)
+
     build = commands.add_parser("build", help="build an atlas file", description="Build an atlas file.")
-    build.add_argument("--out", type=Path, default=default_path(), metavar="FILE", help="default %(default)s")
+    build.add_argument(
+        "--out", type=Path, metavar="FILE", help=f"default {default_path()}, or build/scan.nc for --method scan"
+    )
     build.add_argument(
         "--method",
         choices=("fold", "scan"),
         default="fold",
         help="fold: direct solution, with a scan beside it as a witness; scan: the report's own method, a plain table",
     )
-    build.add_argument("--threads", type=_order, metavar="N", help="default: all; the file does not depend on it")
+    build.add_argument("--threads", type=_threads, metavar="N", help="default: all; the file does not depend on it")
     build.add_argument("--quiet", action="store_true", help="no progress bar")
     build.set_defaults(run=_build)
 
@@ -109,6 +137,12 @@ def _parser() -> argparse.ArgumentParser:
     info.add_argument("file", type=Path, nargs="?", default=default_path(), metavar="FILE", help="default %(default)s")
     info.set_defaults(run=_info)
     return parser
+
+
+def _threads(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of threads")
+    return int(text)
 
 
 def _add_atlas(parser: argparse.ArgumentParser) -> None:
@@ -150,8 +184,8 @@ def _verdict(states: CriticalStates, lam: float, w_f: float, atlas: Atlas | None
     if not len(codes) or (codes == status.NO_TRANSITION).all():
         n = int(states.n[0]) if len(codes) else 1
         _say(
-            f"no transition n = {n}: lambda = {lam:g} is not longer than lambda_c{n} = "
-            f"{float(threshold_length(w_f, n)):.10g} for w_f = {w_f:g}"
+            f"no transition n = {n}: lambda = {lam:.15g} is not longer than lambda_c{n} = "
+            f"{float(unchecked_threshold_length(w_f, n)):.15g} for w_f = {w_f:.15g}"
         )
         return NO_STATE
     bad = codes != status.OK
@@ -160,11 +194,16 @@ def _verdict(states: CriticalStates, lam: float, w_f: float, atlas: Atlas | None
             atlas.states(lam, w_f, states.n[codes == status.OUTSIDE])
         except ValueError as error:
             _say(str(error).split("; outside=")[0] + "; --solve computes such points directly")
-    for k in np.flatnonzero(bad & (codes != status.OUTSIDE)):
-        _say(f"n = {states.n[k]}: {states.sentence(k)}")
+    for code in np.unique(codes[bad & (codes != status.OUTSIDE)]):
+        orders = states.n[codes == code]
+        _say(
+            f"n = {orders[0]}{f' and {len(orders) - 1} more' if len(orders) > 1 else ''}: {status.SENTENCES[int(code)]}"
+        )
     if not bad.all():
         return OK
-    return OUTSIDE if (codes == status.OUTSIDE).any() else NO_STATE
+    if (codes == status.OUTSIDE).any():
+        return OUTSIDE
+    return NO_STATE if (codes[bad] == status.NO_TRANSITION).any() else FAILED
 
 
 def _rows(states: CriticalStates) -> list[dict[str, Any]]:
@@ -195,45 +234,61 @@ def _as_table(states: CriticalStates) -> str:
     return "\n".join(lines) + "\n" if len(lines) > 1 else ""
 
 
+def _equilibria(options: argparse.Namespace) -> int:
+    found = equilibria(options.lam, options.wf, options.gamma)
+    names = ("R_x0", "x_f", "z_f", "tension", "nodes", "median", "boundary_error")
+    rows = [{name: getattr(found, name)[k].item() for name in names} for k in range(len(found))]
+    if options.json:
+        print(json.dumps(rows, indent=1))
+        return OK
+    print(f"{'R_x0':>20} {'x_f':>20} {'z_f':>20} {'tension':>16} {'nodes':>5} {'E':>9}")
+    for row in rows:
+        cells = " ".join(f"{row[name]:>20.13g}" for name in ("R_x0", "x_f", "z_f"))
+        mark = "  median" if row["median"] else ""
+        print(f"{cells} {row['tension']:>16.10g} {row['nodes']:>5} {row['boundary_error']:>9.1e}{mark}")
+    return OK
+
+
 def _build(options: argparse.Namespace) -> int:
     from atlas.build import build_atlas
 
-    print(build_atlas(options.out, options.method, threads=options.threads, progress=not options.quiet))
+    out = options.out or (default_path() if options.method == "fold" else Path("build/scan.nc"))
+    print(build_atlas(out, options.method, threads=options.threads, progress=not options.quiet))
     return OK
 
 
 def _plot(options: argparse.Namespace) -> int:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    matplotlib.rcParams["svg.hashsalt"] = "towatlas"
+    if options.out.suffix.lower() not in FIGURE_FORMATS:
+        raise ValueError(f"--out {options.out}: the ending must be one of {', '.join(FIGURE_FORMATS)}")
+    atlas = open_atlas(options.atlas)
+    os.environ["MPLBACKEND"] = "Agg"
     import matplotlib.pyplot as plt
 
     from atlas.plot import plot_critical
 
-    formats = plt.gcf().canvas.get_supported_filetypes()
-    if options.out.suffix[1:].lower() not in formats:
-        raise ValueError(f"--out {options.out}: the ending must be one of {', '.join(sorted(formats))}")
-    atlas = open_atlas(options.atlas)
+    plt.rcParams["svg.hashsalt"] = "towatlas"
     figure, axes = plt.subplots(figsize=(7.2, 4.8), layout="constrained")
     plot_critical(atlas, ax=axes)
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    metadata = {"Date": None} if options.out.suffix.lower() == ".svg" else None
+    metadata = {"Date": None} if options.out.suffix.lower() == ".svg" else {}
     figure.savefig(options.out, dpi=200, metadata=metadata)
     _say(f"wrote {options.out}")
     return OK
 
 
 def _info(options: argparse.Namespace) -> int:
-    atlas = open_atlas(options.file)
-    axes = atlas.axes
-    print(f"file          {options.file}")
-    print(f"n             1 .. {atlas.n_max}")
-    print(f"w_f           0 .. {axes.w_f_max:g}")
-    print(f"lam - lam_c   {axes.excess_min:g} .. {axes.excess_max:g}")
-    for name in sorted(atlas.attributes):
-        print(f"{name:<22}  {atlas.attributes[name]}")
-    print(f"{'sha256':<22}  {atlas.sha256}")
+    attributes, _, seal = read_root(options.file)
+    print(f"{'file':<40}  {options.file}")
+    if attributes.get("method") == "fold":
+        atlas = open_atlas(options.file)
+        axes = atlas.axes
+        print(f"{'n':<40}  1 .. {atlas.n_max}")
+        print(f"{'w_f':<40}  0 .. {axes.w_f_max:g}")
+        print(f"{'lam - lambda_c':<40}  {axes.excess_min:g} .. {axes.excess_max:g}")
+    for name in sorted(attributes):
+        value = attributes[name]
+        print(f"{name:<40}  {format(value, '.2g') if isinstance(value, float) else value}")
+    print(f"{'seal (SHA-256 of the file but the seal)':<40}  {seal}")
     return OK
 
 
@@ -248,6 +303,9 @@ def main(arguments: list[str] | None = None) -> int:
     except ValueError as error:
         _say(str(error))
         return USAGE
+    except ArithmeticError as error:
+        _say(str(error))
+        return FAILED
     except BrokenPipeError:
         sys.stderr.close()
         return OK

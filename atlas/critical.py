@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from atlas.checks import check_broadcast, check_order, check_positive_finite, check_real
-from atlas.limits import excess_length
+from atlas.limits import unchecked_excess_length
 from kernels import status
 
 Array = NDArray[np.float64]
@@ -113,7 +113,7 @@ def solve_critical(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Critical
     A shot from the fish up with offset a at t = mu satisfies the boundary condition at the fish; the n-th zero of
     q = dp/da on it is the n-th fold, of the cable gamma^2 = |p|, lambda = (t - mu)/|p|, w_f = mu/|p|. Two unknowns
     (a, gamma) are found by Newton in the logarithms. Relative error of gamma: `error`, about
-    24 eps (1 + lambda / (lambda - lambda_cn)).
+    48 eps (1 + lambda / (lambda - lambda_cn)).
 
     References
     ----------
@@ -129,5 +129,5 @@ def solve_critical(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Critical
     check_positive_finite("w_f", w_f, zero=True)
     lam, w_f, n = check_broadcast(lam=lam, w_f=w_f, n=check_order(n))
     flat_n, flat_w, flat_lam = n.ravel(), w_f.ravel(), lam.ravel()
-    columns = solve_rows(flat_n, flat_w, flat_lam, excess_length(flat_lam, flat_w, flat_n))
+    columns = solve_rows(flat_n, flat_w, flat_lam, unchecked_excess_length(flat_lam, flat_w, flat_n))
     return CriticalStates(n=n, lam=lam, w_f=w_f, **{name: column.reshape(n.shape) for name, column in columns.items()})

@@ -55,7 +55,7 @@ def plain_table(
     variables = {
         renamed.get(name, name): variable(dims, name, data)
         if name == "status"
-        else variable(dims, name, data, ancillary_variables="status" if name == "error" else "error status")
+        else variable(dims, name, data, ancillary_variables="error status" if name == "gamma" else "status")
         for name, data in table.items()
     }
     variables["lambda_c"] = variable(("n", "w_f"), "lambda_c", lambda_c)
@@ -78,7 +78,11 @@ def root_attributes(method: str, extra: dict[str, Any]) -> dict[str, Any]:
         "source": f"towatlas, method {method}",
         "references": f"{REPORT}, On the Shape of a Cable Towed in a Circular Path",
         "comment": "gamma_c[n, w_f, lam] is the speed Omega sqrt(R/g) at which the n-th pair of equilibria appears; "
-        "missing where lam <= lambda_c (status no_transition).",
+        "missing where lam <= lambda_c = 2 n - 1 + sqrt(1 + w_f^2) - w_f (status no_transition), and where another "
+        "status says why. All quantities are dimensionless: lengths over the tow radius R, forces over "
+        "(mu + rho A) g R, with mu the mass of the cable and rho A that of the fluid it displaces, per unit length, "
+        "g gravity and Omega the rotation of the tow point. At the tow point x = 1, outwards positive; z is positive "
+        "downwards from it. Between grid points interpolate logarithms in log(lam - lambda_c) and log(w_f).",
         "method": method,
         **extra,
     }
@@ -98,7 +102,7 @@ def write_atlas(path: Path, root: xr.Dataset, groups: dict[str, xr.Dataset]) -> 
     seal = xr.Variable(
         (),
         np.array(BLANK_SEAL, f"S{len(BLANK_SEAL)}"),
-        {"long_name": "SHA-256 of all bytes of this file, taken with zeros for these 64 digits"},
+        {"long_name": "SHA-256 of all bytes of this file, taken with 64 times the character 0 for its digits here"},
     )
     root = root.assign({"seal": seal})
     with written_in_place(path) as temporary:

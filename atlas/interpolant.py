@@ -83,9 +83,8 @@ class Axes:
         """w_f at coordinate y; exactly 0 at y = -1."""
         return W_SCALE * np.expm1(0.5 * (y + 1.0) * np.log1p(self.w_f_max / W_SCALE))
 
-    def holds(self, excess: Array, w_f: Array) -> NDArray[np.bool_]:
-        """Whether points lie in the domain; the rounding of lambda at its ends is let pass."""
-        slack = 1e-9
+    def holds(self, excess: Array, w_f: Array, slack: Array) -> NDArray[np.bool_]:
+        """Whether points lie in the domain; the rounding of lambda, `slack` of the excess, is let pass at its ends."""
         return (
             (excess >= self.excess_min * (1.0 - slack))
             & (excess <= self.excess_max * (1.0 + slack))

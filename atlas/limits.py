@@ -3,15 +3,29 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from atlas.checks import check_broadcast, check_order, check_positive_finite, check_real
 
-def threshold_offset(w_f: ArrayLike) -> NDArray[np.float64]:
+Array = NDArray[np.float64]
+
+
+def threshold_offset(w_f: ArrayLike) -> Array:
     """Offset of the fish at every threshold, sqrt(1 + w_f^2) - w_f, without cancellation."""
     w_f = np.asarray(w_f, float)
     with np.errstate(over="ignore"):
         return 1.0 / (w_f + np.hypot(1.0, w_f))
 
 
-def threshold_length(w_f: ArrayLike, n: ArrayLike = 1) -> NDArray[np.float64]:
+def unchecked_threshold_length(w_f: ArrayLike, n: ArrayLike) -> Array:
+    """`threshold_length` of numbers already checked."""
+    return (2.0 * np.asarray(n) - 1.0) + threshold_offset(w_f)
+
+
+def unchecked_excess_length(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike) -> Array:
+    """`excess_length` of numbers already checked, or that may be bad."""
+    return (np.asarray(lam, float) - (2.0 * np.asarray(n) - 1.0)) - threshold_offset(w_f)
+
+
+def threshold_length(w_f: ArrayLike, n: ArrayLike = 1) -> Array:
     """Cable length at and below which there is no n-th transition.
 
     Parameters
@@ -26,6 +40,11 @@ def threshold_length(w_f: ArrayLike, n: ArrayLike = 1) -> NDArray[np.float64]:
     ndarray
         lambda_cn [-], of the broadcast shape.
 
+    Raises
+    ------
+    ValueError
+        For a w_f that is negative or not finite, an n that is no whole number from 1, and what is not a number.
+
     Notes
     -----
     lambda_cn = 2 n - 1 + sqrt(1 + w_f^2) - w_f. Near it gamma_cn grows without bound, as (lambda - lambda_cn)^(-1/2).
@@ -39,10 +58,13 @@ def threshold_length(w_f: ArrayLike, n: ArrayLike = 1) -> NDArray[np.float64]:
     >>> float(threshold_length(0.0, 2))
     4.0
     """
-    return (2.0 * np.asarray(n) - 1.0) + threshold_offset(w_f)
+    w_f = check_real("w_f", w_f)
+    check_positive_finite("w_f", w_f, zero=True)
+    w_f, n = check_broadcast(w_f=w_f, n=check_order(n))
+    return unchecked_threshold_length(w_f, n)
 
 
-def excess_length(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> NDArray[np.float64]:
+def excess_length(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Array:
     """Cable length beyond the threshold, lambda - lambda_cn(w_f) [-]; its rounding error is that of lambda.
 
     Examples
@@ -50,10 +72,14 @@ def excess_length(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> NDArray[n
     >>> float(excess_length(10.0, 0.0, 1))
     8.0
     """
-    return (np.asarray(lam, float) - (2.0 * np.asarray(n) - 1.0)) - threshold_offset(w_f)
+    lam, w_f = check_real("lam", lam), check_real("w_f", w_f)
+    check_positive_finite("lam", lam)
+    check_positive_finite("w_f", w_f, zero=True)
+    lam, w_f, n = check_broadcast(lam=lam, w_f=w_f, n=check_order(n))
+    return unchecked_excess_length(lam, w_f, n)
 
 
-def massless_cable(lam: ArrayLike) -> NDArray[np.float64]:
+def massless_cable(lam: ArrayLike) -> Array:
     """First critical speed gamma_c1 for w_f -> infinity, (lambda^(2/3) - 1)^(-3/4); nan for lambda <= 1.
 
     The cable is then a straight rod that carries a point mass.
@@ -68,7 +94,7 @@ def massless_cable(lam: ArrayLike) -> NDArray[np.float64]:
     return np.where(base > 0.0, np.abs(base), np.nan) ** -0.75
 
 
-def long_cable(n: ArrayLike) -> NDArray[np.float64]:
+def long_cable(n: ArrayLike) -> Array:
     """gamma_cn^2 lambda for lambda -> infinity without a fish, z_n = j_{0,n}^2 / 4 with the n-th zero of J0.
 
     The cable is then a hanging chain at its n-th resonance; the correction is of order lambda^(-2/3).

@@ -2,8 +2,8 @@
 
 import os
 import sys
+import threading
 from collections.abc import Callable
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from atlas import interpolant
 from atlas.checks import check_broadcast, check_order, check_outside, check_real
 from atlas.critical import CriticalStates, solve_rows
-from atlas.limits import excess_length, threshold_length
+from atlas.limits import unchecked_excess_length, unchecked_threshold_length
 from atlas.nomenclature import SYMBOLS
 from atlas.seal import AtlasFileError, read_sealed
 from kernels import status
@@ -22,14 +22,40 @@ from kernels import status
 SCHEMA_VERSION = 1
 INTERPOLANT = "support/interpolant"  # the group of the series
 EPS = np.finfo(float).eps
-ROUNDINGS = 24.0  # as in kernels.extract, whose import would bring numba (test_error_constants_agree)
+ROUNDINGS = 48.0  # as in kernels.extract, whose import would bring numba (test_error_constants_agree)
 
 Array = NDArray[np.float64]
+
+_NETCDF = threading.Lock()
 
 
 def default_path() -> Path:
     """The atlas used when none is named: $TOWATLAS_FILE, else build/atlas.nc."""
     return Path(os.environ.get("TOWATLAS_FILE", "build/atlas.nc"))
+
+
+def _dataset(path: Path, data: bytes) -> netCDF4.Dataset:
+    try:
+        file = netCDF4.Dataset(path.name, memory=data)
+    except (OSError, RuntimeError) as error:
+        raise AtlasFileError(f"{path} is not a readable NetCDF-4 file: {error}") from None
+    file.set_auto_mask(False)
+    return file
+
+
+def read_root(path: Path) -> tuple[dict[str, Any], bytes, str]:
+    """Global attributes, bytes and seal of any towatlas file, an atlas or a plain table; errors as `open_atlas`."""
+    data, seal = read_sealed(path)
+    with _NETCDF, _dataset(path, data) as file:
+        attributes = {name: file.getncattr(name) for name in file.ncattrs()}
+    version = attributes.get("schema_version")
+    if version is None:
+        raise AtlasFileError(f"{path} is not an atlas: it has no schema_version")
+    if version > SCHEMA_VERSION:
+        raise AtlasFileError(
+            f"{path} has schema version {version}, this towatlas reads up to {SCHEMA_VERSION}; upgrade towatlas"
+        )
+    return attributes, data, seal
 
 
 def open_atlas(path: str | os.PathLike | None = None) -> "Atlas":
@@ -64,8 +90,8 @@ class Atlas:
     """Critical states of the vacuum problem, interpolated from an atlas file. Made by `open_atlas`.
 
     The methods `critical_speed`, `reaction`, `fish_offset`, `fish_depth`, `tow_tension`, `error` and `status` take
-    (lam, w_f, n=1, outside="raise"), scalars, arrays that broadcast or xarray objects, and return one quantity;
-    `states` takes the same and returns all of them.
+    (lam, w_f, n=1, outside="raise"), scalars, arrays that broadcast or xarray DataArrays, and return one quantity;
+    `states` takes scalars and plain arrays and returns all of them. Safe to share between threads.
 
     lam : cable length over tow radius [-]; w_f : fish weight [-]; n : number of the transition.
     outside : what becomes of points the table does not hold (too close to the threshold, too long a cable, too heavy
@@ -75,44 +101,24 @@ class Atlas:
     """
 
     def __init__(self, path: Path):
-        data, self.sha256 = read_sealed(path)
         self.path = path
-        try:
-            self._file = netCDF4.Dataset(path.name, memory=data)
-        except (OSError, RuntimeError) as error:
-            raise AtlasFileError(f"{path} is not a readable NetCDF-4 file: {error}") from None
-        self._file.set_auto_mask(False)
-        self.attributes: dict[str, Any] = {name: self._file.getncattr(name) for name in self._file.ncattrs()}
-        version = self.attributes.get("schema_version")
-        if version is None:
-            raise AtlasFileError(f"{path} is not an atlas: it has no schema_version")
-        if version > SCHEMA_VERSION:
-            raise AtlasFileError(
-                f"{path} has schema version {version}, this towatlas reads up to {SCHEMA_VERSION}; upgrade towatlas"
-            )
-        try:
-            self._group = self._file[INTERPOLANT]
-        except (IndexError, KeyError):
+        self.attributes, data, self.sha256 = read_root(path)
+        if self.attributes.get("method") != "fold":
             raise AtlasFileError(
                 f"{path} was built with --method {self.attributes.get('method')} and holds a plain table only; "
                 "lookup needs an atlas built with --method fold"
-            ) from None
-        self.axes = interpolant.Axes(
-            excess_min=float(self._group.excess_min),
-            excess_max=float(self._group.excess_max),
-            w_f_max=float(self._group.w_f_max),
-        )
-        self.n_max = int(self._file.dimensions["n"].size)
-        self._series: dict[str, Array] = {}
-
-    def _coefficients(self, name: str) -> Array:
-        if name not in self._series:
-            self._series[name] = np.asarray(self._group[f"{name}_series"][:], dtype=np.float64)
-        return self._series[name]
-
-    @cached_property
-    def _error_map(self) -> Array:
-        return np.asarray(self._group["gamma_error"][:], dtype=np.float64)
+            )
+        # Everything is read now, under the lock: the NetCDF library is not safe to call from several threads.
+        with _NETCDF, _dataset(path, data) as file:
+            group = file[INTERPOLANT]
+            self.axes = interpolant.Axes(
+                excess_min=float(group.excess_min), excess_max=float(group.excess_max), w_f_max=float(group.w_f_max)
+            )
+            self._series: dict[str, Array] = {
+                name: np.asarray(group[f"{name}_series"][:], np.float64) for name in interpolant.FIELDS
+            }
+            self._error_map: Array = np.asarray(group["gamma_error"][:], np.float64)
+        self.n_max = len(self._error_map)
 
     def states(self, lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1, outside: str = "raise") -> CriticalStates:
         """All quantities of the critical states, with error estimate and status; see the class for the parameters."""
@@ -160,12 +166,13 @@ class Atlas:
 
     def _answer(self, n: NDArray[np.int64], w_f: Array, lam: Array, outside: str) -> dict[str, NDArray[Any]]:
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            excess = excess_length(lam, w_f, n)
+            excess = unchecked_excess_length(lam, w_f, n)
             sound = np.isfinite(lam) & np.isfinite(w_f) & (lam > 0.0) & (w_f >= 0.0)
             absent = sound & (excess <= 0.0)
-            inside = sound & ~absent & self.axes.holds(excess, w_f) & (n <= self.n_max)
+            slack = 4.0 * EPS * (1.0 + np.abs(lam / excess))
+            inside = sound & ~absent & self.axes.holds(excess, w_f, slack) & (n <= self.n_max)
         codes = np.full(len(n), status.OUTSIDE, np.int8)
-        codes[~np.isfinite(lam) | ~np.isfinite(w_f)] = status.NOT_A_NUMBER
+        codes[~sound] = status.BAD_INPUT
         codes[absent] = status.NO_TRANSITION
         codes[inside] = status.OK
         unanswered = ~(inside | absent)
@@ -197,7 +204,7 @@ class Atlas:
             return
         x, y = self.axes.x(excess), self.axes.y(w_f)
         for name in interpolant.FIELDS:
-            field = interpolant.evaluate(self._coefficients(name), n, x, y)
+            field = interpolant.evaluate(self._series[name], n, x, y)
             table[name][inside] = interpolant.from_field(name, field, excess, n)
         table["tension"][inside] = np.hypot(w_f + lam, table["R_x0"][inside])
         blocks = self._error_map.shape[1:]
@@ -209,34 +216,40 @@ class Atlas:
 
     def _complaint(self, n: NDArray[np.int64], w_f: Array, lam: Array, bad: NDArray[np.bool_]) -> str:
         """What is wrong with the first unanswered point, and how many there are."""
+        remedy = '; outside="solve" computes such points directly, outside="nan" leaves them out'
         i = int(np.flatnonzero(bad)[0])
         axes = self.axes
-        if np.isnan(lam[i]) or np.isnan(w_f[i]):
-            reason = f"{'lam' if np.isnan(lam[i]) else 'w_f'} is nan"
-        elif not lam[i] > 0.0:
-            reason = f"lam = {lam[i]:g} is not positive"
-        elif not 0.0 <= w_f[i] <= axes.w_f_max:
-            reason = f"w_f = {w_f[i]:g} is outside the atlas, 0 to {axes.w_f_max:g}"
+        if not (np.isfinite(lam[i]) and lam[i] > 0.0):
+            reason = f"lam = {lam[i]:.15g} is not finite and positive"
+            remedy = '; outside="nan" leaves such points out'
+        elif not (np.isfinite(w_f[i]) and w_f[i] >= 0.0):
+            reason = f"w_f = {w_f[i]:.15g} is not finite, or negative"
+            remedy = '; outside="nan" leaves such points out'
+        elif w_f[i] > axes.w_f_max:
+            reason = f"w_f = {w_f[i]:.15g} is outside the atlas, 0 to {axes.w_f_max:g}"
         elif n[i] > self.n_max:
             reason = f"n = {n[i]} is outside the atlas, 1 to {self.n_max}"
         else:
-            threshold = float(threshold_length(w_f[i], n[i]))
+            threshold = float(unchecked_threshold_length(w_f[i], n[i]))
             reason = (
-                f"lam = {lam[i]:.15g} is outside the atlas: for n = {n[i]}, w_f = {w_f[i]:g} it holds lam from "
+                f"lam = {lam[i]:.15g} is outside the atlas: for n = {n[i]}, w_f = {w_f[i]:.15g} it holds lam from "
                 f"{threshold + axes.excess_min:.10g} to {threshold + axes.excess_max:.10g}"
             )
         others = f" ({bad.sum()} of {len(bad)} points are outside)" if len(bad) > 1 else ""
-        return f'{reason}{others}; outside="solve" computes such points directly, outside="nan" leaves them out'
+        return reason + others + remedy
 
 
 def _with_xarray(plain: Callable, name: str, lam: Any, w_f: Any, n: Any) -> Any:
     """Apply a function of arrays to arguments some of which may be xarray objects; then the result is one too."""
     # Whoever passes an xarray object has imported xarray: no need to import it to find out.
     xarray = sys.modules.get("xarray")
-    if xarray is None or not any(isinstance(value, xarray.DataArray | xarray.Variable) for value in (lam, w_f, n)):
+    labelled = [value for value in (lam, w_f, n) if hasattr(value, "dims")]
+    if xarray is None or not labelled:
         return plain(lam, w_f, n)
+    if not all(isinstance(value, xarray.DataArray) for value in labelled):
+        raise ValueError("labelled arguments must be xarray DataArrays; take one variable out of a Dataset")
     result = xarray.apply_ufunc(plain, lam, w_f, n)
     symbol = SYMBOLS[name]
-    result.name = symbol.name if isinstance(result, xarray.DataArray) else None
+    result.name = symbol.name
     result.attrs = {"long_name": symbol.long_name, "units": "1"}
     return result

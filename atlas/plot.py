@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from atlas.limits import excess_length, long_cable, massless_cable, threshold_length
+from atlas.limits import long_cable, massless_cable, unchecked_excess_length, unchecked_threshold_length
 from atlas.lookup import Atlas
 from atlas.nomenclature import SYMBOLS
 
@@ -54,7 +54,7 @@ def plot_critical(
     for n in orders:
         for weight, style in zip(w_f, STYLES, strict=False):
             excess = np.geomspace(atlas.axes.excess_min, atlas.axes.excess_max, 600)
-            lam = threshold_length(weight, n) + excess
+            lam = unchecked_threshold_length(weight, n) + excess
             inside = lam <= 1000.0
             gamma = atlas.critical_speed(lam[inside], weight, n)
             label = f"{SYMBOLS['w_f'].tex} = {weight:g}" if n == orders[0] else None
@@ -72,8 +72,8 @@ def _draw_limits(ax: Axes, orders: tuple[int, ...]) -> None:
     """Thresholds without a fish, long cables without a fish, and the massless cable."""
     lam = np.geomspace(1.0001, 1000.0, 800)
     for n in orders:
-        ax.axvline(float(threshold_length(0.0, n)), **{**LIMIT, "linestyle": (0, (1, 2))})
-        far = lam[excess_length(lam, 0.0, n) > 6.0 * n]
+        ax.axvline(float(unchecked_threshold_length(0.0, n)), **{**LIMIT, "linestyle": (0, (1, 2))})
+        far = lam[unchecked_excess_length(lam, 0.0, n) > 6.0 * n]
         ax.plot(far, np.sqrt(float(long_cable(n)) / far), **LIMIT)
     ax.plot(lam, massless_cable(lam), **{**LIMIT, "linestyle": (0, (5, 2))})
     ax.annotate(
@@ -94,7 +94,12 @@ def _draw_limits(ax: Axes, orders: tuple[int, ...]) -> None:
         arrowprops={"arrowstyle": "-", "color": "0.55", "linewidth": 0.7},
     )
     ax.text(
-        float(threshold_length(0.0, orders[0])) * 1.03, 0.0225, "thresholds $2n$", fontsize=8, color="0.3", rotation=90
+        float(unchecked_threshold_length(0.0, orders[0])) * 1.03,
+        0.0225,
+        "thresholds $2n$",
+        fontsize=8,
+        color="0.3",
+        rotation=90,
     )
 
 

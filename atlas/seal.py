@@ -77,6 +77,18 @@ def read_sealed(path: Path) -> tuple[bytes, str]:
     return data, stored
 
 
+def check_writable(path: Path) -> None:
+    """Raise AtlasFileError unless a file can be put at `path`; makes its folder."""
+    if path.is_dir():
+        raise AtlasFileError(f"{path} is a folder; name a file in it")
+    try:
+        path.absolute().parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise AtlasFileError(f"{path} cannot be written: {error.strerror}") from None
+    if not os.access(path.absolute().parent, os.W_OK):
+        raise AtlasFileError(f"{path} cannot be written: no permission to write in its folder")
+
+
 @contextmanager
 def written_in_place(path: Path) -> Iterator[Path]:
     """A temporary path beside `path`; what is written there is sealed and moved into place when the block ends well.

@@ -16,6 +16,8 @@ LANES = 32
 ZOOM_GUESSES = 32  # shots across the window in which an extremum of E is looked for
 ZOOMS = 5  # each narrows the window by about 15
 SECANTS = 60
+# Relative change of a speed when the segments are doubled, beyond which it is no longer their truncation error.
+TRUSTED = 1e-3
 
 
 @kernel
@@ -197,7 +199,7 @@ def scan_system(w_f, lam, gamma_low, gamma_high, speeds, guesses, segments, n_ma
     """Critical states 1..n_max of one cable by scanning speeds from gamma_low to gamma_high.
 
     results[n-1] : gamma, R_x0, resolution of gamma, resolution of R_x0. Both resolutions are absolute and hold the
-    final bracket, the spacing of the guesses, and the change when the number of segments is doubled.
+    final bracket, the spacing of the guesses, and twice the change when the number of segments is doubled.
     statuses[n-1] : OK, NOT_FOUND (none up to gamma_high) or NOT_CONVERGED.
     """
     for n in range(n_max):
@@ -209,6 +211,7 @@ def scan_system(w_f, lam, gamma_low, gamma_high, speeds, guesses, segments, n_ma
     zoom = np.empty(ZOOM_GUESSES)
     places = np.zeros(2 * n_max + 2, np.int64)
     gamma_before = gamma_low
+    previous = 0.0
     found = 0
     ratio = (gamma_high / gamma_low) ** (1.0 / (speeds - 1))
     for k in range(speeds):
@@ -222,12 +225,17 @@ def scan_system(w_f, lam, gamma_low, gamma_high, speeds, guesses, segments, n_ma
             fine, u_fine, width, step = _tangency(
                 w_f, lam, n, below, above, middle, half, 2 * segments, tolerance, zoom
             )
-            statuses[n - 1] = status.OK if coarse > 0.0 and fine > 0.0 else status.NOT_CONVERGED
-            results[n - 1, 0] = fine
-            results[n - 1, 1] = u_fine * fine * fine
-            results[n - 1, 2] = width + abs(fine - coarse)
-            results[n - 1, 3] = step * fine * fine + abs(u_fine * fine * fine - u_coarse * coarse * coarse)
-            gamma_before = fine if fine > 0.0 else gamma_before
+            # Another pair caught in the window gives an earlier speed again; a truncation error this large, anything.
+            sound = fine > previous and abs(fine - coarse) <= TRUSTED * fine
+            statuses[n - 1] = status.OK if sound else status.NOT_CONVERGED
+            if sound:
+                results[n - 1, 0] = fine
+                results[n - 1, 1] = u_fine * fine * fine
+                results[n - 1, 2] = width + 2.0 * abs(fine - coarse)
+                change = abs(u_fine * fine * fine - u_coarse * coarse * coarse)
+                results[n - 1, 3] = step * fine * fine + 2.0 * change
+                gamma_before = fine
+                previous = fine
             found = n
         if found == n_max:
             break

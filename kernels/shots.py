@@ -32,8 +32,8 @@ LANE_ROWS = 4 * ROWS + 9
 JOB, MODE, COUNT, BASE_COUNT, LANDINGS = range(5)
 BOOK_ROWS = 5
 
-# A forced step below this fraction of the overshooting step is taken as a second-order correction: its third order is
-# below rounding.
+# A step below this fraction of the way from BASE is taken as a second-order correction: its third order is below
+# rounding. Of that way, not of the overshooting step, which may be longer by far than all the cable.
 LANDED = 1e-5
 LANDING_LIMIT = 40
 
@@ -245,7 +245,7 @@ def _after_landing_step(lanes, book, lane):
         lanes[LOW, lane] = lanes[OFFSET, lane]
     else:
         lanes[HIGH, lane] = lanes[OFFSET, lane]
-    if abs(d) <= LANDED * lanes[RESUME + H, lane]:
+    if abs(d) <= LANDED * abs(lanes[OFFSET, lane]):
         return True, d
     if not (lanes[LOW, lane] < lanes[OFFSET, lane] + d < lanes[HIGH, lane]):
         d = 0.5 * (lanes[LOW, lane] + lanes[HIGH, lane]) - lanes[OFFSET, lane]
@@ -304,7 +304,7 @@ def _settle_end(lanes, book, lane):
 def _advance(lanes, book, lane, first_fold, last_fold, folds, i):
     """What follows the step a lane just made; returns whether its shot ended, and with what status."""
     if not (np.isfinite(lanes[P, lane]) and np.isfinite(lanes[Q, lane]) and np.isfinite(lanes[TAU, lane])):
-        return True, status.NOT_A_NUMBER
+        return True, status.BAD_INPUT
     if lanes[STEPS, lane] > lanes[STEP_LIMIT, lane]:
         return True, status.STEP_LIMIT
     if book[MODE, lane] == MARCH:
@@ -346,7 +346,7 @@ def march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts,
 
     ends[i] : tau, f, p, z, v, q where the shot ended. folds[i, n - first_fold[i]] : tau, f, p, z at the n-th zero of
     q, for first_fold[i] <= n <= last_fold[i], untouched for those beyond the end. counts[i] : zeros of q passed.
-    statuses[i] : OK, STEP_LIMIT, NOT_CONVERGED or NOT_A_NUMBER; the values are those reached.
+    statuses[i] : OK, STEP_LIMIT, NOT_CONVERGED or BAD_INPUT; the values are those reached.
     """
     lanes = np.ones((LANE_ROWS, LANES))
     lanes[FORCED, :] = 0.0
@@ -363,10 +363,10 @@ def march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts,
                 if not _sane(a[i], mu[i], tau_end[i]):
                     ends[i, :] = np.nan
                     counts[i] = 0
-                    statuses[i] = status.NOT_A_NUMBER
+                    statuses[i] = status.BAD_INPUT
                 elif _load(lanes, book, lane, i, a[i], mu[i], tau_end[i], max_steps):
                     sound = np.isfinite(lanes[P, lane]) and np.isfinite(lanes[Q, lane])
-                    _unload(lanes, book, lane, status.OK if sound else status.NOT_A_NUMBER, ends, counts, statuses)
+                    _unload(lanes, book, lane, status.OK if sound else status.BAD_INPUT, ends, counts, statuses)
                 else:
                     busy += 1
         if busy == 0:

@@ -9,21 +9,21 @@ STEP_LIMIT = 2
 NOT_CONVERGED = 3
 OUTSIDE = 4
 NOT_FOUND = 5
-NOT_A_NUMBER = 6
+BAD_INPUT = 6
 LOST_IN_ROUNDING = 7
 
 SENTENCES = {
     OK: "computed",
     NO_TRANSITION: "no such transition: the cable is not longer than lambda_cn",
-    STEP_LIMIT: "a shot needed more steps than allowed; raise max_steps",
+    STEP_LIMIT: "the shots are too long: the cable has too many nodes at this speed",
     NOT_CONVERGED: "the direct solver did not converge; please report the inputs",
     OUTSIDE: "outside the range of the atlas; ask for the direct solver",
     NOT_FOUND: "the scan found no such transition up to its highest speed",
-    NOT_A_NUMBER: "an input is not a finite number, or so large that the arithmetic overflows",
+    BAD_INPUT: "an input is not finite, not positive (lambda), negative (w_f), or so large that arithmetic overflows",
     LOST_IN_ROUNDING: "lambda is so close to lambda_cn that rounding leaves fewer than four digits of the answer",
 }
 
 # Names for CF flag_meanings: one word each, in the order of the codes.
 FLAG_MEANINGS = (
-    "computed no_transition step_limit not_converged outside_atlas not_found_by_scan not_a_number lost_in_rounding"
+    "computed no_transition step_limit not_converged outside_atlas not_found_by_scan bad_input lost_in_rounding"
 )

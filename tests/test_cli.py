@@ -128,8 +128,8 @@ def test_info(capsys, atlas_path):
     code, out, _ = run(capsys, "info", atlas_path)
     assert code == 0
     for words in (
-        "n             1 .. 6",
-        "w_f           0 .. 10000",
+        "1 .. 6",
+        "0 .. 10000",
         "worst_lookup_error",
         "towatlas_version",
         "sha256",

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import netCDF4
 import numpy as np
@@ -175,6 +176,12 @@ def test_scan_build_holds_a_plain_table(tmp_path):
         assert (table.status.values[exact.status == status.NO_TRANSITION] == status.NO_TRANSITION).all()
     with pytest.raises(AtlasFileError, match="lookup needs an atlas built with --method fold"):
         atlas.open_atlas(path)
+
+
+def test_places_that_cannot_be_written(tmp_path):
+    for path, match in ((tmp_path, "is a folder"), (Path("/proc/none/atlas.nc"), "cannot be written")):
+        with pytest.raises(AtlasFileError, match=match):
+            small(path)
 
 
 def test_bad_build_arguments(tmp_path):

@@ -61,13 +61,13 @@ def test_no_transition_is_an_answer(atlas_file):
         (1500.0, 0.0, 1, "lam = 1500 is outside"),
         (10.0, 2e4, 1, "w_f = 20000 is outside the atlas, 0 to 10000"),
         (100.0, 0.0, 7, "n = 7 is outside the atlas, 1 to 6"),
-        (np.nan, 0.0, 1, "lam is nan"),
-        (10.0, np.nan, 1, "w_f is nan"),
-        (np.inf, 0.0, 1, "lam = inf is outside"),
-        (10.0, np.inf, 1, "w_f = inf is outside"),
-        (0.0, 0.0, 1, "lam = 0 is not positive"),
-        (-3.0, 0.0, 1, "lam = -3 is not positive"),
-        (10.0, -1.0, 1, "w_f = -1 is outside"),
+        (np.nan, 0.0, 1, "lam = nan is not finite and positive"),
+        (10.0, np.nan, 1, "w_f = nan is not finite, or negative"),
+        (np.inf, 0.0, 1, "lam = inf is not finite and positive"),
+        (10.0, np.inf, 1, "w_f = inf is not finite, or negative"),
+        (0.0, 0.0, 1, "lam = 0 is not finite and positive"),
+        (-3.0, 0.0, 1, "lam = -3 is not finite and positive"),
+        (10.0, -1.0, 1, "w_f = -1 is not finite, or negative"),
         (10.0, 0.0, 0, "n counts the transitions"),
         (10.0, 0.0, 1.5, "n counts the transitions"),
         (None, 0.0, 1, "lam must be a real number"),
@@ -89,7 +89,7 @@ def test_unknown_choice_for_outside(atlas_file):
 def test_one_bad_point_spoils_no_other(atlas_file):
     n, w_f, lam = random_cables(20000, 9)
     good = atlas_file.critical_speed(lam, w_f, n)
-    for bad, code in ((np.nan, status.NOT_A_NUMBER), (-1.0, status.OUTSIDE), (1e9, status.OUTSIDE)):
+    for bad, code in ((np.nan, status.BAD_INPUT), (-1.0, status.BAD_INPUT), (1e9, status.OUTSIDE)):
         spoiled = lam.copy()
         spoiled[777] = bad
         for choice in ("nan", "solve"):
@@ -134,6 +134,45 @@ def test_xarray_in_and_out(atlas_file):
     assert float(gamma.sel(cable="long")[1]) == pytest.approx(atlas_file.critical_speed(10.0, 1.0, 2), rel=1e-14)
 
 
+def test_labelled_arrays_are_aligned_or_refused(atlas_file):
+    lam = xr.DataArray([5.0, 10.0], dims="cable")
+    for function in (atlas_file.states, atlas.solve_critical):
+        with pytest.raises(ValueError, match=r"lam is a labelled DataArray; .* pass lam\.values"):
+            function(lam, 1.0, 1)
+    for labelled in (xr.Dataset({"lam": lam}), lam.variable):
+        with pytest.raises(ValueError, match="must be xarray DataArrays"):
+            atlas_file.critical_speed(labelled, 1.0)
+
+
+def test_masked_values_are_not_looked_up(atlas_file):
+    masked = np.ma.masked_array([10.0, 20.0], mask=[False, True])
+    with pytest.raises(ValueError, match="lam = nan"):
+        atlas_file.critical_speed(masked, 1.0)
+    assert np.isnan(atlas_file.critical_speed(masked, 1.0, outside="nan")[1])
+
+
+def test_threads_may_share_an_atlas(atlas_path):
+    """Eight threads open the file and look up at once, in a process of their own: the NetCDF library would crash."""
+    code = (
+        "import atlas\n"
+        "from concurrent.futures import ThreadPoolExecutor\n"
+        f"ask = lambda lam: float(atlas.open_atlas({str(atlas_path)!r}).critical_speed(lam, 1.0))\n"
+        f"table = atlas.open_atlas({str(atlas_path)!r})\n"
+        "with ThreadPoolExecutor(8) as pool:\n"
+        "    a = list(pool.map(lambda lam: float(table.critical_speed(lam, 1.0)), range(5, 50)))\n"
+        "    b = list(pool.map(ask, range(5, 50)))\n"
+        "assert a == b\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_atlas_can_be_pickled(atlas_file):
+    import pickle
+
+    copy = pickle.loads(pickle.dumps(atlas_file))
+    assert copy.critical_speed(10.0, 1.0) == atlas_file.critical_speed(10.0, 1.0)
+
+
 @FIXTURE
 @given(lam=st.floats(allow_nan=True), w_f=st.floats(allow_nan=True), n=st.integers(1, 8))
 def test_any_float_gets_a_value_or_a_reason(atlas_file, lam, w_f, n):
@@ -144,7 +183,7 @@ def test_any_float_gets_a_value_or_a_reason(atlas_file, lam, w_f, n):
     else:
         assert np.isnan(states.gamma)
         if states.status != status.NO_TRANSITION:
-            with pytest.raises(ValueError, match=r"outside|nan|positive"):
+            with pytest.raises(ValueError, match=r"outside|not finite"):
                 atlas_file.critical_speed(lam, w_f, n)
 
 

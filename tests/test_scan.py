@@ -64,3 +64,12 @@ def test_beyond_the_highest_speed_is_not_found():
     _, statuses = scan(0.0, 4.1, gamma_max=2.0)
     assert list(statuses) == [status.OK] + 3 * [status.NOT_FOUND]
     assert excess_length(4.1, 0.0, 2) > 0
+
+
+def test_speeds_rise_with_n_or_are_not_given():
+    """On this cable the window of the fourth pair catches the second: the scan must not give its speed for it."""
+    results, statuses = scan(316.22776601683796, 100.0, guesses=512)
+    found = statuses == status.OK
+    assert (np.diff(results[found, 0]) > 0).all()
+    exact = direct(316.22776601683796, 100.0).gamma
+    assert (np.abs(results[found, 0] - exact[found]) <= results[found, 2]).all()

@@ -1,0 +1,107 @@
+"""All equilibria of one cable at one speed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atlas.checks import check_one
+from kernels import status
+
+# Segments of the forward shot that bears witness to each root.
+WITNESS_SEGMENTS = 10_000
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Equilibria:
+    """Every equilibrium of one cable, in rising order of R_x0; arrays of shape (equilibria,), all dimensionless.
+
+    lam, w_f, gamma : the cable and its speed. R_x0 : radial reaction at the tow point. x_f, z_f : position of the fish.
+    tension : at the tow point. nodes : number of nodes. median : which one is the median root, the shape that Skop
+    expects to be seen. boundary_error : E of Eq. (33) of a forward shot with this R_x0, an independent witness, in
+    which its own truncation error dominates. error : estimated relative error of x_f.
+    """
+
+    lam: float
+    w_f: float
+    gamma: float
+    R_x0: Array
+    x_f: Array
+    z_f: Array
+    tension: Array
+    nodes: NDArray[np.int64]
+    median: NDArray[np.bool_]
+    boundary_error: Array
+    error: Array
+
+    def __len__(self) -> int:
+        return len(self.R_x0)
+
+
+def equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
+    """All equilibria of a cable towed in a vacuum.
+
+    Parameters
+    ----------
+    lam : float
+        Cable length over tow radius [-], > 0.
+    w_f : float
+        Fish weight over (mu + rho A) g R [-], >= 0.
+    gamma : float
+        Rotational frequency Omega sqrt(R/g) [-], > 0.
+
+    Returns
+    -------
+    Equilibria
+        All of them, an odd number.
+
+    Raises
+    ------
+    ValueError
+        For numbers out of range, and what is not one number.
+    ArithmeticError
+        If the computation overflows or does not converge.
+
+    Notes
+    -----
+    Complete by construction: the offsets at which the number of zeros of q = dp/da along the shot changes separate
+    monotone pieces of p(t_e; a), each of which holds at most one equilibrium and one mirrored one. Their number is
+    1 + 2 #{n : gamma > gamma_cn}.
+
+    References
+    ----------
+    NRL Report 7048, Eqs. (29)-(35); median root, section "The character of the solutions for lambda > lambda_c".
+
+    Examples
+    --------
+    >>> [round(float(r), 6) for r in equilibria(37.8, 1352, 2.97).R_x0]
+    [-444837.737541, 552.265408, 469356.531881]
+    """
+    from kernels.equilibria import ERROR, NODES, R_X0, X_F, Z_F, solve_equilibria
+    from kernels.scan import forward_shots
+
+    lam, w_f, gamma = check_one("lam", lam), check_one("w_f", w_f, zero=True), check_one("gamma", gamma)
+    results, outcome = solve_equilibria(w_f, lam, gamma)
+    if outcome != status.OK:
+        raise ArithmeticError(f"lam = {lam:g}, w_f = {w_f:g}, gamma = {gamma:g}: {status.SENTENCES[outcome]}")
+    results = results[np.argsort(results[:, R_X0])]
+    rows = len(results)
+    r_x0 = np.ascontiguousarray(results[:, R_X0])
+    witness, x_end, r_x_end = np.empty(rows), np.empty(rows), np.empty(rows)
+    cable = (np.full(rows, value) for value in (w_f, lam, gamma))
+    forward_shots(*cable, r_x0, WITNESS_SEGMENTS, witness, x_end, r_x_end, 0, rows)
+    return Equilibria(
+        lam=lam,
+        w_f=w_f,
+        gamma=gamma,
+        R_x0=r_x0,
+        x_f=results[:, X_F],
+        z_f=results[:, Z_F],
+        tension=np.hypot(w_f + lam, r_x0),
+        nodes=results[:, NODES].astype(np.int64),
+        median=np.arange(rows) == rows // 2,
+        boundary_error=witness,
+        error=results[:, ERROR],
+    )

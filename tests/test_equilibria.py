@@ -1,0 +1,162 @@
+"""All equilibria of one cable: complete, accurate, the roots of the report among them."""
+
+import json
+
+import numpy as np
+import pytest
+from helpers import boundary_error
+from hypothesis import given
+from hypothesis import strategies as st
+from test_cli import run
+
+import atlas
+from atlas.limits import excess_length
+
+
+def random_systems(rows, seed):
+    rng = np.random.default_rng(seed)
+    w_f = np.where(rng.random(rows) < 0.15, 0.0, 10 ** rng.uniform(-3, 3.5, rows))
+    return w_f, 10 ** rng.uniform(0.05, 1.8, rows), 10 ** rng.uniform(-1.2, 1.0, rows)
+
+
+def expected_number(w_f, lam, gamma):
+    """1 + 2 #{n : gamma > gamma_cn}, by the direct solver of folds."""
+    number = np.ones(len(lam), int)
+    n = 1
+    while (exists := excess_length(lam, w_f, n) > 0).any():
+        states = atlas.solve_critical(lam[exists], w_f[exists], n)
+        number[exists] += 2 * (gamma[exists] > states.gamma)
+        n += 1
+    return number
+
+
+def test_count_identity():
+    """Found by counting zeros of q, their number is the one that the critical speeds say: 600 random cables."""
+    w_f, lam, gamma = random_systems(600, 11)
+    found = [atlas.equilibria(*system) for system in zip(lam, w_f, gamma, strict=True)]
+    expected = expected_number(w_f, lam, gamma)
+    np.testing.assert_array_equal([len(e) for e in found], expected)
+    assert expected.max() > 15
+    assert (expected == 1).sum() > 20
+    for e in found:
+        assert (np.diff(e.R_x0) > 0).all()
+        assert e.median.sum() == 1
+        assert e.median[len(e) // 2]
+        # Nodes come in pairs: 0, then two shapes for each number up to the highest.
+        assert sorted(e.nodes) == sorted([0, *np.repeat(np.arange(1, len(e) // 2 + 1), 2)])
+        assert e.nodes[-1] == 0
+        assert (np.abs(e.x_f) <= 1 + e.lam).all()
+        # Near a fold x_f is a root of a function with hardly a slope: a few of these 2452 lie there.
+        assert (e.error < 1e-10).all()
+        assert np.median(e.error) < 1e-14
+
+
+@pytest.mark.parametrize(
+    ("lam", "w_f", "gamma", "root", "nodes"),
+    [
+        (37.8, 1352, 1.64, 5.5436291, 1),
+        (37.8, 1352, 2.97, 552.2654082, 1),
+        (37.8, 1352, 5.94, 534.2432718, 2),
+        (2.0, 0, 1.0, 3.8194580, 0),
+    ],
+)
+def test_roots_of_the_report(lam, w_f, gamma, root, nodes):
+    e = atlas.equilibria(lam, w_f, gamma)
+    assert float(e.R_x0[e.median][0]) == pytest.approx(root, abs=6e-8)
+    assert e.nodes[e.median][0] == nodes
+
+
+def test_crowded_roots():
+    """Three of five roots in 0.3 % of the bounds of Eq. (35)."""
+    e = atlas.equilibria(37.8, 1352, 5.94)
+    assert len(e) == 5
+    assert list(e.nodes) == [1, 2, 2, 1, 0]
+    bounds = 2 * 5.94**2 * (37.8**2 / 2 + 1352 * 37.8)
+    assert np.ptp(e.R_x0[1:4]) < 0.0035 * bounds
+
+
+@pytest.mark.parametrize(("lam", "w_f", "n"), [(10.0, 0.0, 1), (10.0, 1.0, 2), (37.8, 1352.0, 2), (6.0, 50.0, 1)])
+def test_within_1e9_of_a_fold(lam, w_f, n):
+    fold = atlas.solve_critical(lam, w_f, n)
+    below = atlas.equilibria(lam, w_f, float(fold.gamma) * (1 - 1e-9))
+    above = atlas.equilibria(lam, w_f, float(fold.gamma) * (1 + 1e-9))
+    assert (len(below), len(above)) == (2 * n - 1, 2 * n + 1)
+    pair = above.R_x0[n - 1 : n + 1]
+    assert pair == pytest.approx(float(fold.R_x0), rel=0.01)
+    assert above.R_x0[n - 1] < float(fold.R_x0) < above.R_x0[n]
+
+
+def test_forward_shots_agree():
+    """E of Skop's forward shot falls with the fourth power of the step at every root, to rounding."""
+    e = atlas.equilibria(12.0, 5.0, 1.8)
+    coarse, fine = (np.abs(boundary_error(5.0, 12.0, 1.8, e.R_x0, k)) for k in (400, 1600))
+    assert (fine < coarse / 100 + 1e-11).all()
+    assert coarse.max() > 1e-9
+    assert (np.abs(e.boundary_error) < 1e-9).all()
+
+
+@pytest.mark.parametrize("system", [(3.0, 0.0, 2.0), (37.8, 1352.0, 5.94), (20.0, 0.5, 1.0), (5.0, 1e4, 30.0)])
+def test_root_against_34_digits(system):
+    """R_x0 to 1e-12: the shot from x_f in 34 digits, corrected to the exact root by one Newton step."""
+    import mpmath as mp
+    import reference
+
+    lam, w_f, gamma = system
+    e = atlas.equilibria(*system)
+    with mp.workdps(34):
+        gamma2 = mp.mpf(gamma) ** 2
+        for x_f, r_x0 in zip(e.x_f, e.R_x0, strict=True):
+            sign = 1 if x_f > 0 else -1
+            a = abs(mp.mpf(x_f)) * gamma2
+            for _ in range(3):
+                end = reference.shot(a, gamma2 * mp.mpf(w_f), gamma2 * mp.mpf(lam))
+                level = gamma2 if end.p > 0 else -gamma2
+                a -= (end.p - level) / end.q
+            exact_sign = 1 if level > 0 else -1
+            exact = exact_sign * end.f / gamma2
+            assert exact_sign == sign
+            assert abs(r_x0 - exact) <= 1e-12 * max(abs(exact), abs(end.v * a) / gamma2 * mp.mpf(2) ** -50 * 1e12)
+            assert abs(x_f - exact_sign * a / gamma2) <= 1e-12 * abs(x_f)
+
+
+@given(lam=st.floats(1e-3, 60), w_f=st.one_of(st.just(0.0), st.floats(1e-6, 1e4)), gamma=st.floats(0.01, 8))
+def test_any_system(lam, w_f, gamma):
+    e = atlas.equilibria(lam, w_f, gamma)
+    assert len(e) % 2 == 1
+    assert len(e) == expected_number(np.array([w_f]), np.array([lam]), np.array([gamma]))[0]
+
+
+@pytest.mark.parametrize(
+    ("system", "match"),
+    [
+        ((np.nan, 0, 1), "lam must be finite"),
+        ((0, 0, 1), "lam must be finite and positive"),
+        ((3, -1, 1), "w_f must be finite and not negative"),
+        ((3, 0, 0), "gamma must be finite and positive"),
+        ((3, 0, np.inf), "gamma must be finite"),
+        (([3, 4], 0, 1), "lam must be one number"),
+        (("3", 0, 1), "lam must be a real number"),
+    ],
+)
+def test_bad_input(system, match):
+    with pytest.raises(ValueError, match=match):
+        atlas.equilibria(*system)
+
+
+def test_overflow_is_said():
+    with pytest.raises(ArithmeticError, match="overflows"):
+        atlas.equilibria(1e80, 1.0, 1e60)
+
+
+def test_shell(capsys):
+    code, out, err = run(capsys, "equilibria", "--lam", 37.8, "--wf", 1352, "--gamma", 5.94, "--json")
+    rows = json.loads(out)
+    assert (code, err) == (0, "")
+    assert list(rows[0]) == ["R_x0", "x_f", "z_f", "tension", "nodes", "median", "boundary_error"]
+    assert [row["median"] for row in rows] == [False, False, True, False, False]
+    assert rows[2]["R_x0"] == pytest.approx(534.2432718, abs=6e-8)
+    code, out, _ = run(capsys, "equilibria", "--lam", 37.8, "--wf", 1352, "--gamma", 5.94)
+    assert code == 0
+    assert len(out.splitlines()) == 6
+    assert "median" in out.splitlines()[3]
+    assert run(capsys, "equilibria", "--lam", 3, "--wf", 0, "--gamma", 0)[0] == 2
