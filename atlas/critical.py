@@ -121,8 +121,8 @@ def solve_critical(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Critical
 
     Examples
     --------
-    >>> round(float(solve_critical(10.0, 0.0).gamma), 12)
-    0.492889676332
+    >>> round(float(solve_critical(10.0, 0.0).gamma), 10)
+    0.4928896763
     """
     lam, w_f = check_real("lam", lam), check_real("w_f", w_f)
     check_positive_finite("lam", lam)

@@ -61,8 +61,8 @@ class ScanSettings:
             "gamma_max": self.gamma_max,
             "gamma_tolerance": self.tolerance,
             "comment": "Forward Runge-Kutta shots over the bounds of Eq. (35). The resolution holds the final bracket "
-            "and twice the change when the segments are doubled. A pair of roots closer than 1/guesses of those bounds "
-            "can be missed: such a transition, and any beyond gamma_max, has status not_found_by_scan.",
+            "and what two doublings of the segments tell of the truncation. A pair of roots closer than 1/guesses of "
+            "those bounds can be missed: such a transition, and any beyond gamma_max, has status not_found_by_scan.",
         }
 
 

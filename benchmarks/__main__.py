@@ -19,8 +19,8 @@ def _processor() -> str:
     return platform.processor() or platform.machine()
 
 
-def methods_table(rows: list[Row]) -> str:
-    """Markdown, times as such and over the first method's."""
+def methods_table(rows: list[Row], whole_domain: float) -> str:
+    """Markdown, times as such and over the first method's; `whole_domain` is the worst error of lookup anywhere."""
     lines = ["| method | worst relative error | time per critical speed | ratio |", "|---|---|---|---|"]
     for row in rows:
         note = f" ({row.note})" if row.note else ""
@@ -33,7 +33,8 @@ def methods_table(rows: list[Row]) -> str:
     lines.append(
         f"Cables of lambda 6 to 50, w_f 0.1 to 100, n = 1 to 3; many at a time for the first two, one thread. "
         f"{_processor()}, Python {platform.python_version()}, {versions}. Unfair to SciPy: its right-hand side is "
-        f"Python; unfair to the others: it is handed a guess."
+        f"Python; unfair to the others: it is handed a guess. Over the whole domain of the atlas, to its thresholds, "
+        f"lookup is within {whole_domain:.0e} of the direct solution (100,000 random cables)."
     )
     return "\n".join(lines) + "\n"
 
@@ -46,9 +47,10 @@ def _time(value: float) -> str:
 def main() -> None:
     table = open_or_build(default_path())
     print("Lookup against the direct solver, 100000 random points of the domain\n")
-    for name, (value, where) in lookup_errors(table, 100_000).items():
+    worst = lookup_errors(table, 100_000)
+    for name, (value, where) in worst.items():
         print(f"  {name:<26} {value:.2g}  {where}")
-    text = methods_table(methods(table, rows=4000, peer_rows=30))
+    text = methods_table(methods(table, rows=4000, peer_rows=30), worst["gamma"][0])
     print("\nCritical speeds, by method\n\n" + text)
     readme = README.read_text()
     before, rest = readme.split(BEGIN)
