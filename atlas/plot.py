@@ -18,7 +18,7 @@ STYLES: tuple[dict[str, Any], ...] = (
     {"color": "#D55E00", "linestyle": (0, (4, 1.5, 1, 1.5))},
     {"color": "#E69F00", "linestyle": (0, (1.5, 1.5))},
 )
-LIMIT: dict[str, Any] = {"color": "0.55", "linewidth": 0.9, "linestyle": "-", "zorder": 1}
+LIMIT: dict[str, Any] = {"color": "0.55", "linewidth": 0.9, "zorder": 1}
 
 
 def plot_critical(
@@ -64,42 +64,31 @@ def plot_critical(
     ax.set_xlabel(SYMBOLS["lam"].axis)
     ax.set_ylabel(SYMBOLS["gamma"].axis)
     ax.grid(which="major", color="0.9", linewidth=0.6)
-    ax.legend(title="fish weight", frameon=False, loc="upper right")
+    ax.legend(handles=curves[: len(w_f)], title="fish weight", frameon=False, loc="upper right")
     return curves
 
 
 def _draw_limits(ax: Axes, orders: tuple[int, ...]) -> None:
-    """Thresholds without a fish, long cables without a fish, and the massless cable."""
+    """Thresholds without a fish, long cables without a fish, and the massless cable, with a legend of their own."""
     lam = np.geomspace(1.0001, 1000.0, 800)
+    handles = []
     for n in orders:
-        ax.axvline(float(unchecked_threshold_length(0.0, n)), **{**LIMIT, "linestyle": (0, (1, 2))})
+        handles = [
+            ax.axvline(
+                float(unchecked_threshold_length(0.0, n)),
+                **LIMIT,
+                linestyle=(0, (1, 2)),
+                label="threshold $2n$, no fish",
+            )
+        ]
         far = lam[unchecked_excess_length(lam, 0.0, n) > 6.0 * n]
-        ax.plot(far, np.sqrt(float(long_cable(n)) / far), **LIMIT)
-    ax.plot(lam, massless_cable(lam), **{**LIMIT, "linestyle": (0, (5, 2))})
-    ax.annotate(
-        "massless cable,\n$(\\lambda^{2/3}-1)^{-3/4}$",
-        xy=(1.12, float(massless_cable(1.12))),
-        xytext=(2.15, 0.13),
-        fontsize=8,
-        color="0.3",
-        arrowprops={"arrowstyle": "-", "color": "0.55", "linewidth": 0.7},
-    )
-    long = 620.0
-    ax.annotate(
-        "hanging chain,\n$\\sqrt{z_n/\\lambda}$",
-        xy=(long, float(np.sqrt(long_cable(1) / long))),
-        xytext=(330.0, 0.0225),
-        fontsize=8,
-        color="0.3",
-        arrowprops={"arrowstyle": "-", "color": "0.55", "linewidth": 0.7},
-    )
-    ax.text(
-        float(unchecked_threshold_length(0.0, orders[0])) * 1.03,
-        0.0225,
-        "thresholds $2n$",
-        fontsize=8,
-        color="0.3",
-        rotation=90,
+        chain = np.sqrt(float(long_cable(n)) / far)
+        handles += ax.plot(far, chain, **LIMIT, label=r"hanging chain, no fish: $j_{0,n}/(2\sqrt{\lambda})$")
+    massless = r"massless cable, $n = 1$: $(\lambda^{2/3} - 1)^{-3/4}$"
+    # Above the curve of the heaviest fish, which it all but covers.
+    handles += ax.plot(lam, massless_cable(lam), **LIMIT | {"color": "0.1", "zorder": 4}, label=massless)
+    ax.add_artist(
+        ax.legend(handles=handles, title="limits", loc="lower left", fontsize=8, framealpha=1, edgecolor="none")
     )
 
 
