@@ -17,7 +17,7 @@ from kernels import extract, status
 
 QUANTITIES = ("gamma", "R_x0", "x_f", "z_f", "tension")
 METHODS = ("critical_speed", "reaction", "fish_offset", "fish_depth", "tow_tension", "error", "status")
-FIXTURE = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+FIXTURE = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def test_lookup_is_the_direct_solution_everywhere(atlas_file):
