@@ -159,6 +159,14 @@ def _say(message: str) -> None:
     print(f"towatlas: {message}", file=sys.stderr)
 
 
+def _announce_compilation(kernel: str) -> None:
+    """Say so before a kernel is compiled, which happens once after installation."""
+    from kernels.compiling import CACHE
+
+    if CACHE is None or not any(CACHE.rglob(f"*.{kernel}-*.nbi")):
+        _say("compiling, once after installation: this takes some 20 s")
+
+
 def _existing(lam: float, w_f: float) -> int:
     """Number of transitions a cable has."""
     return max(0, math.ceil(0.5 * (lam + 1.0 - float(threshold_offset(w_f)))) - 1)
@@ -173,6 +181,8 @@ def _critical(options: argparse.Namespace) -> int:
     if options.n is None and existing > limit:
         remedy = "name one with --n" if options.solve else "the atlas ends there, --solve --n N solves any"
         _say(f"lambda = {lam:g} has {existing} transitions; the first {limit} follow ({remedy})")
+    if atlas is None:
+        _announce_compilation("solve_folds")
     states = solve_critical(lam, w_f, orders) if atlas is None else atlas.states(lam, w_f, orders, outside="nan")
     print(_as_json(states) if options.json else _as_table(states), end="")
     return _verdict(states, lam, w_f, atlas)
@@ -235,6 +245,7 @@ def _as_table(states: CriticalStates) -> str:
 
 
 def _equilibria(options: argparse.Namespace) -> int:
+    _announce_compilation("solve_equilibria")
     found = equilibria(options.lam, options.wf, options.gamma)
     names = ("R_x0", "x_f", "z_f", "tension", "nodes", "median", "boundary_error")
     rows = [{name: getattr(found, name)[k].item() for name in names} for k in range(len(found))]

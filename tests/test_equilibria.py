@@ -151,7 +151,8 @@ def test_overflow_is_said():
 def test_shell(capsys):
     code, out, err = run(capsys, "equilibria", "--lam", 37.8, "--wf", 1352, "--gamma", 5.94, "--json")
     rows = json.loads(out)
-    assert (code, err) == (0, "")
+    assert code == 0
+    assert err == "" or "compiling, once" in err
     assert list(rows[0]) == ["R_x0", "x_f", "z_f", "tension", "nodes", "median", "boundary_error"]
     assert [row["median"] for row in rows] == [False, False, True, False, False]
     assert rows[2]["R_x0"] == pytest.approx(534.2432718, abs=6e-8)
