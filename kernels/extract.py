@@ -153,7 +153,8 @@ def solve_folds(n, w_f, lam, excess, a, gamma, results, error, statuses, begin, 
             if outcomes[j] != status.OK:
                 # A step too far: go back half of it. Nothing to go back on a first guess, or after many halvings.
                 if retreats[k] == RETREATS or not size[k] < np.inf:
-                    statuses[i] = outcomes[j]
+                    # The input was sound: a shot that overflowed says that the solver lost its way.
+                    statuses[i] = status.STEP_LIMIT if outcomes[j] == status.STEP_LIMIT else status.NOT_CONVERGED
                     active[k] = False
                     continue
                 retreats[k] += 1

@@ -268,3 +268,11 @@ def test_types_and_shapes():
 def test_bad_input_of_closed_forms(function, arguments, match):
     with pytest.raises(ValueError, match=match):
         function(*arguments)
+
+
+def test_a_solver_that_loses_its_way_does_not_blame_the_input():
+    """Fish ten times heavier than the atlas holds, within 1e-9 of the threshold: solved, or not converged."""
+    n, w_f = np.array([6, 2, 4]), np.array([86583.0, 93251.2, 78199.1])
+    states = atlas.solve_critical(threshold_length(w_f, n) + np.array([1.8e-9, 2.2e-10, 5.5e-10]), w_f, n)
+    assert set(states.status) <= {status.OK, status.NOT_CONVERGED, status.LOST_IN_ROUNDING}
+    assert (np.isnan(states.gamma) == (states.status != status.OK)).all()
