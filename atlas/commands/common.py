@@ -1,0 +1,79 @@
+"""What the commands share: exit codes, messages, and the types of their arguments."""
+
+import argparse
+import math
+import sys
+from pathlib import Path
+
+from atlas.lookup import default_path
+
+OK, FAILED, USAGE, OUTSIDE, NO_STATE, FILE = 0, 1, 2, 3, 4, 5
+
+
+def number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text!r} is not finite")
+    return value
+
+
+def length(text: str) -> float:
+    value = number(text)
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f"lambda = {text} is not positive")
+    return value
+
+
+def speed(text: str) -> float:
+    value = number(text)
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f"gamma = {text} is not positive")
+    return value
+
+
+def weight(text: str) -> float:
+    value = number(text)
+    if value < 0.0:
+        raise argparse.ArgumentTypeError(f"w_f = {text} is negative")
+    return value
+
+
+def order(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+    if not 1 <= value < 2**31:
+        raise argparse.ArgumentTypeError(f"n = {text}: transitions are counted from 1")
+    return value
+
+
+def threads(text: str) -> int:
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of threads")
+    return int(text)
+
+
+def add_atlas(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--atlas",
+        type=Path,
+        default=default_path(),
+        metavar="FILE",
+        help="default %(default)s; $TOWATLAS_FILE sets another",
+    )
+
+
+def say(message: str) -> None:
+    print(f"towatlas: {message}", file=sys.stderr)
+
+
+def announce_compilation(kernel: str) -> None:
+    """Say so before a kernel is compiled, which happens once after installation."""
+    from kernels.compiling import CACHE
+
+    if CACHE is None or not any(CACHE.rglob(f"*.{kernel}-*.nbi")):
+        say("compiling, once after installation: this takes some 20 s")

@@ -1,0 +1,125 @@
+"""`towatlas critical`: critical speeds of one cable."""
+
+import argparse
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from atlas.commands.common import (
+    FAILED,
+    NO_STATE,
+    OK,
+    OUTSIDE,
+    add_atlas,
+    announce_compilation,
+    length,
+    order,
+    say,
+    weight,
+)
+from atlas.critical import CriticalStates, solve_critical
+from atlas.limits import threshold_offset, unchecked_threshold_length
+from atlas.lookup import Atlas, open_atlas
+from atlas.nomenclature import REPORT, SYMBOLS
+from kernels import status
+
+# Transitions solved at once when none is named; a cable of 1e4 tow radii has 5000.
+MOST_SOLVED = 1000
+
+
+def add(commands: Any) -> None:
+    """Declare the command."""
+    parser = commands.add_parser(
+        "critical",
+        help="critical speeds of one cable",
+        description=f"Critical speeds and reactions of one cable. Dimensionless groups as in {REPORT}: "
+        "gamma = Omega sqrt(R/g), lengths over the tow radius R, forces over (mu + rho A) g R.",
+    )
+    parser.add_argument("--lam", type=length, required=True, metavar="LAMBDA", help=SYMBOLS["lam"].long_name)
+    parser.add_argument("--wf", type=weight, required=True, metavar="W_F", help=SYMBOLS["w_f"].long_name)
+    parser.add_argument("--n", type=order, metavar="N", help="one transition; without it every one that exists")
+    add_atlas(parser)
+    parser.add_argument(
+        "--solve", action="store_true", help="solve directly instead of looking up: any n, any length, no atlas needed"
+    )
+    parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
+    parser.set_defaults(run=_run)
+
+
+def _existing(lam: float, w_f: float) -> int:
+    """Number of transitions a cable has."""
+    return max(0, math.ceil(0.5 * (lam + 1.0 - float(threshold_offset(w_f)))) - 1)
+
+
+def _run(options: argparse.Namespace) -> int:
+    lam, w_f = options.lam, options.wf
+    existing = _existing(lam, w_f)
+    atlas = None if options.solve else open_atlas(options.atlas)
+    limit = MOST_SOLVED if atlas is None else atlas.n_max
+    orders = np.arange(1, min(existing, limit) + 1) if options.n is None else np.array([options.n])
+    if options.n is None and existing > limit:
+        remedy = "name one with --n" if options.solve else "the atlas ends there, --solve --n N solves any"
+        say(f"lambda = {lam:g} has {existing} transitions; the first {limit} follow ({remedy})")
+    if atlas is None:
+        announce_compilation("solve_folds")
+    states = solve_critical(lam, w_f, orders) if atlas is None else atlas.states(lam, w_f, orders, outside="nan")
+    print(_as_json(states) if options.json else _as_table(states), end="")
+    return _verdict(states, lam, w_f, atlas)
+
+
+def _verdict(states: CriticalStates, lam: float, w_f: float, atlas: Atlas | None) -> int:
+    """Say what could not be answered; the exit code."""
+    codes = states.status
+    if not len(codes) or (codes == status.NO_TRANSITION).all():
+        n = int(states.n[0]) if len(codes) else 1
+        say(
+            f"no transition n = {n}: lambda = {lam:.15g} is not longer than lambda_c{n} = "
+            f"{float(unchecked_threshold_length(w_f, n)):.15g} for w_f = {w_f:.15g}"
+        )
+        return NO_STATE
+    bad = codes != status.OK
+    if atlas is not None and (codes == status.OUTSIDE).any():
+        try:
+            atlas.states(lam, w_f, states.n[codes == status.OUTSIDE])
+        except ValueError as error:
+            say(str(error).split("; outside=")[0] + "; --solve computes such points directly")
+    for code in np.unique(codes[bad & (codes != status.OUTSIDE)]):
+        orders = states.n[codes == code]
+        say(
+            f"n = {orders[0]}{f' and {len(orders) - 1} more' if len(orders) > 1 else ''}: {status.SENTENCES[int(code)]}"
+        )
+    if not bad.all():
+        return OK
+    if (codes == status.OUTSIDE).any():
+        return OUTSIDE
+    return NO_STATE if (codes[bad] == status.NO_TRANSITION).any() else FAILED
+
+
+def _rows(states: CriticalStates) -> list[dict[str, Any]]:
+    names = ("n", "lam", "w_f", "gamma", "R_x0", "x_f", "error", "status")
+    columns = {name: np.atleast_1d(getattr(states, name)) for name in names}
+    words = status.FLAG_MEANINGS.split()
+    rows = []
+    for k in range(len(columns["n"])):
+        row: dict[str, Any] = {"n": int(columns["n"][k])}
+        for name in names[1:-1]:
+            value = float(columns[name][k])
+            row[name] = value if math.isfinite(value) else None
+        row["status"] = words[int(columns["status"][k])]
+        rows.append(row)
+    return rows
+
+
+def _as_json(states: CriticalStates) -> str:
+    return json.dumps(_rows(states), indent=1) + "\n"
+
+
+def _as_table(states: CriticalStates) -> str:
+    lines = [f"{'n':>4} {'gamma':>20} {'R_x0':>20} {'x_f':>20} {'error':>8}  status"]
+    for row in _rows(states):
+        cells = " ".join(f"{'-' if row[k] is None else format(row[k], '.13g'):>20}" for k in ("gamma", "R_x0", "x_f"))
+        error = "-" if row["error"] is None else format(row["error"], ".1e")
+        lines.append(f"{row['n']:>4} {cells} {error:>8}  {row['status']}")
+    return "\n".join(lines) + "\n" if len(lines) > 1 else ""
