@@ -5,11 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from atlas.branches import Members, extrema, shoot_lanes, shoot_singly, solve_members
 from atlas.checks import check_one
 from kernels import status
 
 # Segments of the forward shot that bears witness to each root.
 WITNESS_SEGMENTS = 10_000
+# With more extrema than this the kernel of many lanes is worth its compilation.
+FEW = 50
 
 Array = NDArray[np.float64]
 
@@ -79,16 +82,14 @@ def equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
     >>> [round(float(r), 3) for r in equilibria(37.8, 1352, 2.97).R_x0]
     [-444837.738, 552.265, 469356.532]
     """
-    from kernels.equilibria import ERROR, NODES, R_X0, X_F, Z_F, solve_equilibria
     from kernels.scan import forward_shots
 
     lam, w_f, gamma = check_one("lam", lam), check_one("w_f", w_f, zero=True), check_one("gamma", gamma)
-    results, outcome = solve_equilibria(w_f, lam, gamma)
-    if outcome != status.OK:
-        raise ArithmeticError(f"lam = {lam:g}, w_f = {w_f:g}, gamma = {gamma:g}: {status.SENTENCES[outcome]}")
-    results = results[np.argsort(results[:, R_X0])]
-    rows = len(results)
-    r_x0 = np.ascontiguousarray(results[:, R_X0])
+    nodes, found = _all_members(w_f, lam, gamma)
+    order = np.argsort(found.R_x0)
+    nodes, x_f, z_f, error = nodes[order], found.x_f[order], found.z_f[order], found.error[order]
+    r_x0 = np.ascontiguousarray(found.R_x0[order])
+    rows = len(order)
     witness, x_end, r_x_end = np.empty(rows), np.empty(rows), np.empty(rows)
     cable = (np.full(rows, value) for value in (w_f, lam, gamma))
     forward_shots(*cable, r_x0, WITNESS_SEGMENTS, witness, x_end, r_x_end, 0, rows)
@@ -97,11 +98,44 @@ def equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
         w_f=w_f,
         gamma=gamma,
         R_x0=r_x0,
-        x_f=results[:, X_F],
-        z_f=results[:, Z_F],
+        x_f=x_f,
+        z_f=z_f,
         tension=np.hypot(w_f + lam, r_x0),
-        nodes=results[:, NODES].astype(np.int64),
+        nodes=nodes,
         median=np.arange(rows) == rows // 2,
         boundary_error=witness,
-        error=results[:, ERROR],
+        error=error,
     )
+
+
+def _all_members(w_f: float, lam: float, gamma: float) -> tuple[NDArray[np.int64], Members]:
+    """Nodes and states of all equilibria of one cable."""
+    cable = np.array([w_f]), np.array([lam]), np.array([gamma])
+    highest, codes = extrema(*cable, shoot_singly)
+    shoot = shoot_singly if highest[0] <= FEW else shoot_lanes
+
+    def solve(n: NDArray[np.int64], outer: bool) -> Members:
+        w_f, lam, gamma = (np.full(len(n), column[0]) for column in cable)
+        return solve_members(w_f, lam, gamma, n, np.full(len(n), outer), shoot)
+
+    if codes[0] == status.OK:
+        n = np.arange(highest[0] + 1)
+        inner = solve(n, False)
+        codes = inner.status
+        there = codes == status.OK
+        outer = solve(n[there & (n > 0)], True)
+        # A pair that is one member short is within rounding of its fold.
+        codes = np.concatenate(
+            [
+                codes[codes != status.NOT_FOUND],
+                np.where(outer.status == status.NOT_FOUND, status.LOST_IN_ROUNDING, outer.status),
+            ]
+        )
+    if (codes != status.OK).any():
+        sentence = status.SENTENCES[int(codes.max())]
+        raise ArithmeticError(f"lam = {lam:g}, w_f = {w_f:g}, gamma = {gamma:g}: {sentence}")
+    nodes = np.concatenate([n[there], n[there & (n > 0)]])
+    columns = {
+        name: np.concatenate([getattr(inner, name)[there], getattr(outer, name)]) for name in Members.__annotations__
+    }
+    return nodes, Members(**columns)

@@ -13,7 +13,7 @@ import numpy as np
 from kernels import status
 from kernels.compiling import helper, inlined, kernel
 from kernels.steppers import taylor_step
-from kernels.vacuum import TINY_FISH, TIP_REACH, tension, tip_series
+from kernels.vacuum import start, tension
 
 LANES = 16  # 8 do not vectorise (the loop is unrolled instead); 16 and 32 do, at the same speed
 IDLE, MARCH, TO_FOLD, TO_END = 0, 1, 2, 3
@@ -153,18 +153,8 @@ def _copy(lanes, source, target, lane):
 @inlined
 def _load(lanes, book, lane, job, a, mu, tau_end, max_steps):
     """Put a shot into a lane; returns whether it ended already, within the tip series."""
-    slant = sqrt(1.0 + a * a)
-    reach = TIP_REACH * slant
-    end = mu + tau_end
-    if mu < TINY_FISH * slant and (mu == 0.0 or (mu < 1e-6 * reach and mu < 1e-6 * end)):
-        t = min(reach, end)
-        f, p, z, v, q = tip_series(a, mu, t)
-        lanes[TAU, lane] = t - mu
-        ended = end <= reach
-    else:
-        f, p, z, v, q = mu * a, a, 0.0, mu, 1.0
-        lanes[TAU, lane] = 0.0
-        ended = tau_end <= 0.0
+    tau, f, p, z, v, q, ended = start(a, mu, tau_end)
+    lanes[TAU, lane] = tau
     lanes[TAU_LOW, lane] = 0.0
     lanes[F, lane] = f
     lanes[P, lane] = p

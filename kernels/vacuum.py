@@ -71,6 +71,19 @@ def tip_series(a, mu, t):
 
 
 @inlined
+def start(a, mu, tau_end):
+    """State (tau, f, p, z, v, q) a shot starts from, and whether it ended already, within the tip series."""
+    slant = sqrt(1.0 + a * a)
+    reach = TIP_REACH * slant
+    end = mu + tau_end
+    if mu < TINY_FISH * slant and (mu == 0.0 or (mu < 1e-6 * reach and mu < 1e-6 * end)):
+        t = min(reach, end)
+        f, p, z, v, q = tip_series(a, mu, t)
+        return t - mu, f, p, z, v, q, end <= reach
+    return 0.0, mu * a, a, 0.0, mu, 1.0, tau_end <= 0.0
+
+
+@inlined
 def tension(t, f):
     """Scaled tension r, the square root of t^2 + f^2."""
     return sqrt(t * t + f * f)

@@ -71,9 +71,9 @@ def say(message: str) -> None:
     print(f"towatlas: {message}", file=sys.stderr)
 
 
-def announce_compilation(kernel: str) -> None:
+def announce_compilation(kernel: str, seconds: int = 20) -> None:
     """Say so before a kernel is compiled, which happens once after installation."""
     from kernels.compiling import CACHE
 
     if CACHE is None or not any(CACHE.rglob(f"*.{kernel}-*.nbi")):
-        say("compiling, once after installation: this takes some 20 s")
+        say(f"compiling, once after installation: this takes some {seconds} s")

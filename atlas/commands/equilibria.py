@@ -27,7 +27,7 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    announce_compilation("solve_equilibria")
+    announce_compilation("shoot_each", 5)
     found = equilibria(options.lam, options.wf, options.gamma)
     names = ("R_x0", "x_f", "z_f", "tension", "nodes", "median", "boundary_error")
     rows = [{name: getattr(found, name)[k].item() for name in names} for k in range(len(found))]
