@@ -9,6 +9,8 @@ from atlas.equilibria import Equilibria, equilibria
 from atlas.limits import excess_length, massless_cable, threshold_length
 from atlas.lookup import Atlas, open_atlas
 from atlas.seal import AtlasFileError
+from atlas.shape import shape
+from atlas.table import EquilibriaTable, FishPositions, open_equilibria
 
 __version__ = "0.1.0"
 __all__ = [
@@ -16,10 +18,14 @@ __all__ = [
     "AtlasFileError",
     "CriticalStates",
     "Equilibria",
+    "EquilibriaTable",
+    "FishPositions",
     "equilibria",
     "excess_length",
     "massless_cable",
     "open_atlas",
+    "open_equilibria",
+    "shape",
     "solve_critical",
     "threshold_length",
 ]

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from atlas.branches import Members, extrema, shoot_lanes, shoot_singly, solve_members
 from atlas.checks import check_one
+from atlas.critical import solve_rows
+from atlas.limits import unchecked_excess_length
 from kernels import status
 
 # Segments of the forward shot that bears witness to each root.
@@ -106,6 +108,35 @@ def equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
         boundary_error=witness,
         error=error,
     )
+
+
+def solve_branch(branch: str, w_f: Array, lam: Array, gamma: Array) -> tuple[NDArray[np.int64], Members]:
+    """The outward or the median equilibrium of each row, solved directly; no checks.
+
+    Returns
+    -------
+    nodes : ndarray of int, shape (rows,)
+    members : Members
+    """
+    n = np.zeros(len(lam), np.int64)
+    if branch == "median":
+        n = folds_passed(w_f, lam, gamma)
+    members = solve_members(w_f, lam, gamma, n, np.zeros(len(lam), bool), shoot_lanes)
+    return n, members
+
+
+def folds_passed(w_f: Array, lam: Array, gamma: Array) -> NDArray[np.int64]:
+    """Number of critical speeds below gamma, for each row."""
+    passed = np.zeros(len(lam), np.int64)
+    rows = np.arange(len(lam))
+    while len(rows):
+        n = passed[rows] + 1
+        excess = unchecked_excess_length(lam[rows], w_f[rows], n)
+        states = solve_rows(n, w_f[rows], lam[rows], excess)
+        # One that rounding hides lies next to its threshold, beyond any speed.
+        rows = rows[(states["status"] == status.OK) & (states["gamma"] < gamma[rows])]
+        passed[rows] += 1
+    return passed
 
 
 def _all_members(w_f: float, lam: float, gamma: float) -> tuple[NDArray[np.int64], Members]:

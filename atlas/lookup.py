@@ -3,7 +3,8 @@
 import os
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -43,10 +44,17 @@ def _dataset(path: Path, data: bytes) -> netCDF4.Dataset:
     return file
 
 
+@contextmanager
+def open_group(path: Path, data: bytes) -> Iterator[netCDF4.Dataset]:
+    """The file whose bytes these are, for reading at once: the NetCDF library is not safe to call from two threads."""
+    with _NETCDF, _dataset(path, data) as file:
+        yield file
+
+
 def read_root(path: Path) -> tuple[dict[str, Any], bytes, str]:
     """Global attributes, bytes and seal of any towatlas file, an atlas or a plain table; errors as `open_atlas`."""
     data, seal = read_sealed(path)
-    with _NETCDF, _dataset(path, data) as file:
+    with open_group(path, data) as file:
         attributes = {name: file.getncattr(name) for name in file.ncattrs()}
     version = attributes.get("schema_version")
     if version is None:
@@ -108,8 +116,7 @@ class Atlas:
                 f"{path} was built with --method {self.attributes.get('method')} and holds a plain table only; "
                 "lookup needs an atlas built with --method fold"
             )
-        # Everything is read now, under the lock: the NetCDF library is not safe to call from several threads.
-        with _NETCDF, _dataset(path, data) as file:
+        with open_group(path, data) as file:
             group = file[INTERPOLANT]
             self.axes = interpolant.Axes(
                 excess_min=float(group.excess_min), excess_max=float(group.excess_max), w_f_max=float(group.w_f_max)

@@ -11,6 +11,7 @@ OUTSIDE = 4
 NOT_FOUND = 5
 BAD_INPUT = 6
 LOST_IN_ROUNDING = 7
+NEAR_FOLD = 8
 
 SENTENCES = {
     OK: "computed",
@@ -21,9 +22,11 @@ SENTENCES = {
     NOT_FOUND: "the scan found no such transition up to its highest speed",
     BAD_INPUT: "an input is not finite, not positive (lambda), negative (w_f), or so large that arithmetic overflows",
     LOST_IN_ROUNDING: "lambda is so close to lambda_cn that rounding leaves fewer than four digits of the answer",
+    NEAR_FOLD: "too close to a fold to interpolate; ask for the direct solver",
 }
 
 # Names for CF flag_meanings: one word each, in the order of the codes.
 FLAG_MEANINGS = (
-    "computed no_transition step_limit not_converged outside_atlas not_found_by_scan bad_input lost_in_rounding"
+    "computed no_transition step_limit not_converged outside_atlas not_found_by_scan bad_input lost_in_rounding "
+    "near_fold"
 )
