@@ -68,7 +68,7 @@ def shape(
     --------
     >>> curve = shape(10.0, 1.0, 0.6, s=[0.0, 5.0, 10.0])
     >>> [round(float(x), 6) for x in curve.x]
-    [1.0, 0.335702, -1.703467]
+    [1.0, 0.335709, -1.703467]
     """
     found = equilibria(lam, w_f, gamma)
     k = check_root(root, found.nodes, found.median)

@@ -20,24 +20,10 @@ from atlas.grids import EquilibriaGrid
 from atlas.seal import AtlasFileError, read_sealed
 from kernels import status
 
-# The default spacing on a part of its range, which holds cables of up to four folds.
-GRID = EquilibriaGrid(
-    w_f=np.concatenate([[0.0], 10.0 ** np.linspace(-2, 2, 17)]),
-    lam=10.0 ** np.linspace(0, 1, 25),
-    gamma=10.0 ** np.linspace(-1, 0.5, 51),
-)
-
 
 @pytest.fixture(scope="module")
-def path(tmp_path_factory):
-    path = tmp_path_factory.mktemp("table") / "equilibria.nc"
-    build_equilibria(path, grid=GRID, progress=False)
-    return path
-
-
-@pytest.fixture(scope="module")
-def table(path):
-    return atlas.open_equilibria(path)
+def table(equilibria_path):
+    return atlas.open_equilibria(equilibria_path)
 
 
 def points(rows, seed):
@@ -46,8 +32,8 @@ def points(rows, seed):
     return 10 ** rng.uniform(0, 1, rows), w_f, 10 ** rng.uniform(-1, 0.5, rows)
 
 
-def test_a_stranger_finds_both_branches(path):
-    with xr.open_dataset(path) as file:
+def test_a_stranger_finds_both_branches(equilibria_path):
+    with xr.open_dataset(equilibria_path) as file:
         assert file.x_f.dims == ("branch", "w_f", "lam", "gamma")
         assert file.branch.attrs["flag_meanings"] == "outward median"
         for name in ("R_x0", "x_f", "z_f", "tension", "nodes", "count", "gamma", "lam", "w_f"):
@@ -66,20 +52,23 @@ def test_a_stranger_finds_both_branches(path):
         assert float(file.error.max()) < 1e-11
 
 
-def test_nodes_agree_with_the_critical_speeds(path):
-    with xr.open_dataset(path) as file, xr.open_dataset(path, group="support/critical") as critical:
+def test_nodes_agree_with_the_critical_speeds(equilibria_path, equilibria_grid):
+    with (
+        xr.open_dataset(equilibria_path) as file,
+        xr.open_dataset(equilibria_path, group="support/critical") as critical,
+    ):
         gamma_c = critical.gamma.values
         assert np.nanmin(gamma_c) > 0
-        passed = np.sum(gamma_c[..., None] < GRID.gamma, axis=0)
+        passed = np.sum(gamma_c[..., None] < equilibria_grid.gamma, axis=0)
         np.testing.assert_array_equal(file.nodes.sel(branch=1), passed)
-        exact = atlas.solve_critical(GRID.lam, GRID.w_f[:, None], 1)
+        exact = atlas.solve_critical(equilibria_grid.lam, equilibria_grid.w_f[:, None], 1)
         known = np.isfinite(gamma_c[0])
         np.testing.assert_allclose(gamma_c[0][known], exact.gamma[known], rtol=1e-11)
 
 
-def test_against_34_digits(path):
+def test_against_34_digits(equilibria_path):
     rng = np.random.default_rng(5)
-    with xr.open_dataset(path) as file:
+    with xr.open_dataset(equilibria_path) as file:
         for _ in range(12):
             k = {name: int(rng.integers(file.sizes[name])) for name in ("branch", "w_f", "lam", "gamma")}
             at = file.isel(k)
@@ -96,10 +85,10 @@ def test_against_34_digits(path):
                 assert abs(sign * end.f / gamma2 - float(at.R_x0)) < 1e-11 * (abs(end.f) + end.v * a) / gamma2
 
 
-def test_same_bytes_for_any_number_of_threads(tmp_path, path):
+def test_same_bytes_for_any_number_of_threads(tmp_path, equilibria_path, equilibria_grid):
     again = tmp_path / "again.nc"
-    build_equilibria(again, grid=GRID, threads=1, progress=False)
-    assert again.read_bytes() == path.read_bytes()
+    build_equilibria(again, grid=equilibria_grid, threads=1, progress=False)
+    assert again.read_bytes() == equilibria_path.read_bytes()
 
 
 @pytest.mark.parametrize("branch", ["median", "outward"])
@@ -139,8 +128,12 @@ def test_never_across_a_fold(table, lam, w_f, n):
     np.testing.assert_allclose(found.x_f[::10], exact, rtol=2e-3)
 
 
-def test_edges_and_outside(table):
-    corner = table.fish([GRID.lam[0], GRID.lam[-1]], [GRID.w_f[0], GRID.w_f[-1]], [GRID.gamma[0], GRID.gamma[-1]])
+def test_edges_and_outside(table, equilibria_grid):
+    corner = table.fish(
+        [equilibria_grid.lam[0], equilibria_grid.lam[-1]],
+        [equilibria_grid.w_f[0], equilibria_grid.w_f[-1]],
+        [equilibria_grid.gamma[0], equilibria_grid.gamma[-1]],
+    )
     assert (corner.status == status.OK).all()
     for point, axis in (((0.9, 1, 1), "lam = 0.9"), ((2, 101, 1), "w_f = 101"), ((2, 1, 0.05), "gamma = 0.05")):
         with pytest.raises(ValueError, match=f'{axis} is outside the table, .* to .*outside="solve"'):
@@ -170,21 +163,21 @@ def test_bad_input(table, more, match):
         table.fish(**{"lam": 2.0, "w_f": 1.0, "gamma": 1.0} | more)
 
 
-def test_other_files_are_refused(path, atlas_path, tmp_path):
+def test_other_files_are_refused(equilibria_path, atlas_path, tmp_path):
     with pytest.raises(AtlasFileError, match="--equilibria"):
         atlas.open_equilibria(atlas_path)
     with pytest.raises(AtlasFileError, match="built with --method equilibria"):
-        atlas.open_atlas(path)
+        atlas.open_atlas(equilibria_path)
     torn = tmp_path / "torn.nc"
-    torn.write_bytes(path.read_bytes()[:-1])
+    torn.write_bytes(equilibria_path.read_bytes()[:-1])
     with pytest.raises(AtlasFileError, match="damaged"):
         atlas.open_equilibria(torn)
     with pytest.raises(FileNotFoundError):
         atlas.open_equilibria(tmp_path / "none.nc")
 
 
-def test_shell(capsys, path, monkeypatch, tmp_path):
-    system = ("fish", "--table", path, "--lam", 8, "--wf", 1)
+def test_shell(capsys, equilibria_path, monkeypatch, tmp_path):
+    system = ("fish", "--table", equilibria_path, "--lam", 8, "--wf", 1)
     code, out, err = run(capsys, *system, "--gamma", 0.9, "--json")
     rows = json.loads(out)
     assert (code, err) == (0, "")
@@ -201,7 +194,7 @@ def test_shell(capsys, path, monkeypatch, tmp_path):
     assert "--solve" in err
     assert run(capsys, *system, "--gamma", 50, "--solve")[0] == 0
     assert run(capsys, "fish", "--table", tmp_path / "no.nc", "--lam", 8, "--wf", 1, "--gamma", 1)[0] == 5
-    code, out, _ = run(capsys, "info", path)
+    code, out, _ = run(capsys, "info", equilibria_path)
     assert code == 0
     assert "0.1 .. 3.16228" in out
     code, _, err = run(capsys, "build", "--equilibria", "--method", "scan")
@@ -209,10 +202,10 @@ def test_shell(capsys, path, monkeypatch, tmp_path):
     assert "one method" in err
 
 
-def test_the_shell_builds_it(capsys, monkeypatch, tmp_path):
+def test_the_shell_builds_it(capsys, monkeypatch, tmp_path, equilibria_grid):
     import atlas.build_equilibria as module
 
-    small = {"w_f": GRID.w_f[:7], "lam": GRID.lam[:8], "gamma": GRID.gamma[:9]}
+    small = {"w_f": equilibria_grid.w_f[:7], "lam": equilibria_grid.lam[:8], "gamma": equilibria_grid.gamma[:9]}
     monkeypatch.setattr(module, "EquilibriaGrid", lambda **axes: EquilibriaGrid(**small | axes))
     code, out, _ = run(capsys, "build", "--equilibria", "--quiet", "--out", tmp_path / "small.nc")
     assert code == 0
@@ -220,9 +213,11 @@ def test_the_shell_builds_it(capsys, monkeypatch, tmp_path):
     read_sealed(tmp_path / "small.nc")
 
 
-def test_cf_compliance(path):
+def test_cf_compliance(equilibria_path):
     checker = shutil.which("compliance-checker", path=os.path.dirname(sys.executable))
     assert checker, "compliance-checker is not installed: pip install towatlas[test]"
-    done = subprocess.run([checker, "-t", "cf:1.11", "-c", "strict", str(path)], capture_output=True, text=True)
+    done = subprocess.run(
+        [checker, "-t", "cf:1.11", "-c", "strict", str(equilibria_path)], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-2000:]
     assert "All tests passed" in done.stdout
