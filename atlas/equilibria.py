@@ -8,13 +8,15 @@ from numpy.typing import NDArray
 from atlas.branches import Members, extrema, shoot_lanes, shoot_singly, solve_members
 from atlas.checks import check_one
 from atlas.critical import solve_rows
-from atlas.limits import unchecked_excess_length
+from atlas.limits import threshold_offset, unchecked_excess_length
 from kernels import status
 
 # Segments of the forward shot that bears witness to each root.
 WITNESS_SEGMENTS = 10_000
 # With more extrema than this the kernel of many lanes is worth its compilation.
 FEW = 50
+# Half waves on all shots of a kind together beyond which a cable is refused: half a minute.
+HALF_WAVES = 2e7
 
 Array = NDArray[np.float64]
 
@@ -67,7 +69,7 @@ def equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
     ValueError
         For numbers out of range, and what is not one number.
     ArithmeticError
-        If the computation overflows or does not converge.
+        If the computation overflows, does not converge, or would take minutes (HALF_WAVES).
 
     Notes
     -----
@@ -139,18 +141,31 @@ def folds_passed(w_f: Array, lam: Array, gamma: Array) -> NDArray[np.int64]:
     return passed
 
 
+def _failure(lam: float, w_f: float, gamma: float, code: int) -> ArithmeticError:
+    return ArithmeticError(f"lam = {lam:g}, w_f = {w_f:g}, gamma = {gamma:g}: {status.SENTENCES[code]}")
+
+
+# What overflows becomes a status of the shots.
+@np.errstate(over="ignore", invalid="ignore")
 def _all_members(w_f: float, lam: float, gamma: float) -> tuple[NDArray[np.int64], Members]:
     """Nodes and states of all equilibria of one cable."""
+    # Extrema too low to reach gamma^2 are as many as the half waves of a straight cable, millions at high speeds: of
+    # those beyond the last n with a transition only one is looked for, as a check on the closed form.
+    half_waves = 2.0 / np.pi * gamma * lam / (np.sqrt(w_f + lam) + np.sqrt(w_f))
+    possible = float(np.ceil((lam + 1.0 - threshold_offset(w_f)) / 2.0))
+    if half_waves * (1.0 + 2.0 * min(possible, half_waves)) > HALF_WAVES:
+        raise _failure(lam, w_f, gamma, status.STEP_LIMIT)
     cable = np.array([w_f]), np.array([lam]), np.array([gamma])
     highest, codes = extrema(*cable, shoot_singly)
-    shoot = shoot_singly if highest[0] <= FEW else shoot_lanes
+    last = min(int(highest[0]), int(possible))
+    shoot = shoot_singly if last <= FEW else shoot_lanes
 
     def solve(n: NDArray[np.int64], outer: bool) -> Members:
         w_f, lam, gamma = (np.full(len(n), column[0]) for column in cable)
         return solve_members(w_f, lam, gamma, n, np.full(len(n), outer), shoot)
 
     if codes[0] == status.OK:
-        n = np.arange(highest[0] + 1)
+        n = np.arange(last + 1)
         inner = solve(n, False)
         codes = inner.status
         there = codes == status.OK
@@ -163,8 +178,7 @@ def _all_members(w_f: float, lam: float, gamma: float) -> tuple[NDArray[np.int64
             ]
         )
     if (codes != status.OK).any():
-        sentence = status.SENTENCES[int(codes.max())]
-        raise ArithmeticError(f"lam = {lam:g}, w_f = {w_f:g}, gamma = {gamma:g}: {sentence}")
+        raise _failure(lam, w_f, gamma, int(codes.max()))
     nodes = np.concatenate([n[there], n[there & (n > 0)]])
     columns = {
         name: np.concatenate([getattr(inner, name)[there], getattr(outer, name)]) for name in Members.__annotations__

@@ -213,8 +213,10 @@ def _draw_critical_speeds(ax: Any, w_f: float, lam: np.ndarray, gamma: np.ndarra
     from matplotlib.patheffects import withStroke
 
     for n in ORDERS:
-        curve_lam = atlas.threshold_length(w_f, n) + np.geomspace(1e-3, lam[-1], 120)
+        curve_lam = atlas.threshold_length(w_f, n) + np.geomspace(1e-3, lam[-1], 70)
         curve = atlas.solve_critical(curve_lam, w_f, n).gamma
+        drawn = (curve < 2 * gamma[-1]) & (curve > gamma[0] / 2) & (curve_lam < 1.3 * lam[-1])
+        curve_lam, curve = curve_lam[drawn], curve[drawn]
         outline = [withStroke(linewidth=2.2, foreground="white", alpha=0.6)]
         ax.plot(curve_lam, curve, color="black", linewidth=0.7, path_effects=outline)
         inside = np.flatnonzero((curve < 12.0) & (curve_lam > 1.2 * lam[0]) & (curve_lam < 0.9 * lam[-1]))
