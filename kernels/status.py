@@ -20,7 +20,7 @@ SENTENCES = {
     NOT_CONVERGED: "the direct solver did not converge; please report the inputs",
     OUTSIDE: "outside the range of the atlas; ask for the direct solver",
     NOT_FOUND: "the scan found no such transition up to its highest speed",
-    BAD_INPUT: "an input is not finite, not positive (lambda), negative (w_f), or so large that arithmetic overflows",
+    BAD_INPUT: "an input is not finite, not positive (lambda), negative (w_f), or so large or small that it overflows",
     LOST_IN_ROUNDING: "lambda is so close to lambda_cn that rounding leaves fewer than four digits of the answer",
     NEAR_FOLD: "too close to a fold to interpolate; ask for the direct solver",
 }
