@@ -75,12 +75,14 @@ def solve_rows(
         solve_folds_parallel(*columns, a, gamma, results, error, codes)
     else:
         solve_folds(*columns, a, gamma, results, error, codes, 0, rows)
+    with np.errstate(over="ignore"):
+        tension = np.where(codes == status.OK, np.hypot(w_f + lam, results[:, 1]), np.nan)
     return {
         "gamma": results[:, 0],
         "R_x0": results[:, 1],
         "x_f": results[:, 2],
         "z_f": results[:, 3],
-        "tension": np.hypot(w_f + lam, results[:, 1]),
+        "tension": tension,
         "error": error,
         "status": codes.astype(np.int8),
     }
