@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 ATLAS := build/atlas.nc
 
 .DEFAULT_GOAL := help
-.PHONY: help install atlas equilibria test bench check figures clean
+.PHONY: help install atlas equilibria test bench failures check figures clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
@@ -29,6 +29,9 @@ test: install  ## run the tests
 
 bench: install  ## measure error and time, print the tables, update the one in the README
 	$(BIN)/python -m benchmarks
+
+failures: install  ## map where methods fail, write the figure and the tables of docs/failures.md
+	$(BIN)/python -m benchmarks.failures
 
 check: install  ## ruff, types, import layers
 	$(BIN)/ruff check .

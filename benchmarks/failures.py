@@ -15,6 +15,7 @@ import numpy as np
 
 import atlas
 from atlas.branches import shoot_lanes, solve_members
+from atlas.published import compare
 from kernels import status
 from kernels.sweeps import forward_shots_parallel
 
@@ -228,11 +229,31 @@ def _draw_critical_speeds(ax: Any, w_f: float, lam: np.ndarray, gamma: np.ndarra
     ax.minorticks_off()
 
 
+def published_table() -> str:
+    """Markdown: every number of the report beside the recomputed one."""
+    lines = ["| quantity | where | printed | recomputed | explained by | explanation |", "|---|---|---|---|---|---|"]
+    for row in compare():
+        p = row.published
+        printed, recomputed, then = row.text()
+        by = f"{then} ({p.method})" if p.method else ""
+        lines.append(f"| {p.quantity} | {p.place} | {printed} | {recomputed} | {by} | {p.explanation} |")
+    return "\n".join(lines) + "\n"
+
+
+def put(page: str, name: str, text: str) -> str:
+    """A page with the text between its two marks replaced."""
+    begin, end = f"<!-- {name}: written by python -m benchmarks.failures -->\n", f"<!-- end of {name} -->"
+    before, rest = page.split(begin)
+    return before + begin + text + end + rest.split(end)[1]
+
+
 def main() -> None:
-    """Compute the maps, write docs/data/failures.csv and docs/failures.svg and .png, print the table."""
+    """Compute the maps; write docs/failures.svg and .png, docs/data/failures.csv and the tables of docs/failures.md."""
     maps = {w_f: failure_map(w_f, LAM, GAMMA) for w_f in WEIGHTS}
     write_csv(maps, DOCS / "data" / "failures.csv")
     draw(maps, LAM, GAMMA, [DOCS / "failures.svg", DOCS / "failures.png"])
+    page = DOCS / "failures.md"
+    page.write_text(put(put(page.read_text(), "summary", summary(maps)), "published", published_table()))
     print(summary(maps))
 
 
