@@ -219,7 +219,7 @@ PUBLISHED: tuple[Published, ...] = (
         2,
         "=",
         lambda: float(threshold_length(10.0)),
-        "Every digit is right. The report calculated curve (b) of Fig. 10 with the rounded value.",
+        "Every digit is right.",
     ),
     Published("lambda_c(0)", "Fig. 11", 2.0, 0, "=", lambda: float(threshold_length(0.0)), "The same."),
     _number(2.1, 3.8, 1, "Fig. 12"),
