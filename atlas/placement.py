@@ -88,7 +88,7 @@ def cables_to_depth(w_f: float, gamma: float, z_f: float, lam_max: float) -> Pla
     --------
     >>> found = cables_to_depth(0, 2, 10, 60)
     >>> [(round(float(lam), 4), int(nodes)) for lam, nodes in zip(found.lam, found.nodes)]
-    []
+    [(13.535, 3), (21.5848, 3), (28.1156, 2)]
     """
     w_f, gamma = check_one("w_f", w_f, zero=True), check_one("gamma", gamma)
     z_f, lam_max = check_one("z_f", z_f), check_one("lam_max", lam_max)

@@ -1,4 +1,4 @@
-"""Quantities with units as people write them, in SI: "0.1824 g/ft", "11/16 in", "3 kn", "40 rpm"; a bare number is SI."""
+"""Quantities with units as people write them, in SI: "0.1824 g/ft", "11/16 in", "3 kn"; a bare number is SI."""
 
 import functools
 import math
@@ -31,7 +31,7 @@ def _registry() -> Any:
     # pint takes a third of a second to import: only who reads units pays.
     import pint
 
-    registry = pint.UnitRegistry()
+    registry: Any = pint.UnitRegistry()
     registry.define("rev = revolution")
     return registry
 
@@ -71,9 +71,7 @@ def parse_quantity(name: str, value: Any, unit: str, bare: str | None = None) ->
     0.0174625
     """
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(
-            f"{name} = {value!r} is not {_KINDS[unit]}; write a number in SI or a text such as {_sample(unit)}"
-        )
+        raise ValueError(f"{name} = {value!r} is not {_KINDS[unit]}; write a number in SI or a text as {_sample(unit)}")
     if isinstance(value, str):
         number, symbol = _split(name, value, unit)
     else:
@@ -90,9 +88,7 @@ def parse_quantity(name: str, value: Any, unit: str, bare: str | None = None) ->
 def _split(name: str, text: str, unit: str) -> tuple[float, str]:
     parts = _QUANTITY.fullmatch(text)
     if parts is None:
-        raise ValueError(
-            f"{name} = {text!r} is not {_KINDS[unit]}; write a number and its unit, such as {_sample(unit)}"
-        )
+        raise ValueError(f"{name} = {text!r} is not {_KINDS[unit]}; write a number and its unit, as {_sample(unit)}")
     sign, whole, above, below, number, divisor, symbol = parts.groups()
     try:
         if whole is not None:
@@ -110,9 +106,7 @@ def _convert(name: str, value: Any, number: float, symbol: str, unit: str) -> fl
     try:
         given = registry.Quantity(1.0, registry.Unit(symbol))
     except Exception:  # pint raises whatever its parser meets
-        raise ValueError(
-            f"{name} = {value!r}: unit {symbol!r} is unknown; write {_sample(unit)}, for example"
-        ) from None
+        raise ValueError(f"{name} = {value!r}: unit {symbol!r} is unknown; write it as {_sample(unit)}") from None
     if not given._is_multiplicative or not _same(given, wanted):
         raise ValueError(f"{name} = {value!r} is not {_KINDS[unit]}{_hint(symbol, given, unit)}")
     return float((number * given).to(wanted.units).magnitude)
@@ -125,7 +119,7 @@ def _hint(symbol: str, given: Any, unit: str) -> str:
         return f": it is not clear whether {symbol!r} counts turns or radians; write rpm, rev/s or rad/s"
     if unit in ("N", "N/m") and given.check("[mass]" if unit == "N" else "[mass]/[length]"):
         return f" but a mass; write {'kgf or lbf' if unit == 'N' else 'kgf/m or lbf/ft'} for the weight of a mass"
-    return f"; write {_sample(unit)}, for example"
+    return f"; write it as {_sample(unit)}"
 
 
 def _sample(unit: str) -> str:
