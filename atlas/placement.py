@@ -151,11 +151,11 @@ class _Search:
         """Shots ended at the depth wanted, by Newton in the length, inside a bracket."""
         rows, a = len(x), np.exp(x)
         # dz/dt <= 1: it takes at least as much cable as the depth.
-        low, high = np.full(rows, self.depth), np.full(rows, self.longest)
+        low, high = np.full(rows, self.depth), np.full(rows, np.inf)
         tau = np.minimum(self.depth * np.hypot(1.0, a), self.longest)
         state, counts = np.full((rows, 6), np.nan), np.zeros(rows, np.int64)
         i = np.arange(rows)
-        for _ in range(ROUNDS):
+        for round_ in range(ROUNDS):
             if not len(i):
                 break
             ends, count, codes = self.shoot(a[i], np.full(len(i), self.mu), tau[i])
@@ -167,13 +167,15 @@ class _Search:
             above = miss > 0.0
             unreached = ~above & (tau[i] >= self.longest) & (miss < 0.0)
             high[i[above]], low[i[~above]] = tau[i[above]], tau[i[~above]]
-            done = (np.abs(step) <= 4.0 * EPS * tau[i]) | (high[i] - low[i] <= 4.0 * EPS * high[i]) | unreached
+            narrow = np.isfinite(high[i]) & (high[i] - low[i] <= 4.0 * EPS * tau[i])
+            done = (np.abs(step) <= 4.0 * EPS * tau[i]) | narrow | unreached
             state[i[unreached]] = np.nan
             trial = tau[i] + step
-            # Beyond the longest the longest itself is tried, once.
-            trial = np.where((trial >= high[i]) & (high[i] == self.longest), self.longest, trial)
-            astray = ~((trial > low[i]) & (trial < high[i])) & (trial != self.longest)
-            tau[i] = np.where(done, tau[i], np.where(astray, 0.5 * (low[i] + high[i]), trial))
+            # Until the depth is passed the longest cable is the last one tried.
+            trial = np.where(np.isinf(high[i]), np.minimum(trial, self.longest), trial)
+            astray = ~((trial > low[i]) & (trial < high[i])) | (round_ % 8 == 7)
+            middle = 0.5 * (low[i] + np.minimum(high[i], self.longest))
+            tau[i] = np.where(done, tau[i], np.where(astray, middle, trial))
             i = i[~done]
         if len(i):
             raise ArithmeticError(status.SENTENCES[status.NOT_CONVERGED])

@@ -12,15 +12,20 @@ from atlas.branches import extrema, shoot_lanes, solve_members
 from atlas.placement import cables_to_depth
 from atlas.scene import read_scene
 
-SCAN = 2000
+SCAN = 300
 
 
 def random_targets(rows, seed):
+    """w_f, gamma, depth and longest cable; every other one a light fish, deep at its speed, with several answers."""
     rng = np.random.default_rng(seed)
-    for _ in range(rows):
-        w_f = 0.0 if rng.random() < 0.3 else 10 ** rng.uniform(-2, 3.3)
-        longest = 10 ** rng.uniform(0.3, 1.7)
-        yield w_f, 10 ** rng.uniform(-0.7, 0.8), longest * 10 ** rng.uniform(-2, 0), longest
+    for k in range(rows):
+        if k % 2:
+            gamma = 10 ** rng.uniform(-0.3, 0.7)
+            z_f = 10 ** rng.uniform(1, 1.8) / gamma**2
+            yield 0.0 if rng.random() < 0.5 else z_f * 10 ** rng.uniform(-3, 0.5), gamma, z_f, 8 * z_f + 3
+        else:
+            longest = 10 ** rng.uniform(0.3, 1.7)
+            yield 10 ** rng.uniform(-2, 3.3), 10 ** rng.uniform(-0.7, 0.8), longest * rng.uniform(0.02, 0.98), longest
 
 
 def scanned(w_f, gamma, z_f, longest):
@@ -40,7 +45,7 @@ def scanned(w_f, gamma, z_f, longest):
 def test_every_answer_is_an_equilibrium_and_none_is_missing():
     """A solver of another kind, by the count at given length: at each length found, and on a scan of lengths."""
     cables = crossings = several = 0
-    for target in random_targets(40, 21):
+    for target in random_targets(24, 21):
         w_f, gamma, z_f, longest = target
         found = cables_to_depth(*target)
         assert (np.diff(found.lam) > 0).all()
@@ -63,8 +68,8 @@ def test_every_answer_is_an_equilibrium_and_none_is_missing():
             within = (found.lam >= low) & (found.lam <= high) & (found.nodes == n) & (found.outer == outer)
             assert within.sum() == 1, (target, low, high, n, outer)
             crossings += 1
-    assert several > 5
-    assert cables >= crossings > 40
+    assert several >= 5
+    assert cables >= crossings > 25
 
 
 @pytest.mark.parametrize(("lam", "w_f", "gamma"), [(37.8, 1352, 5.94), (30.0, 0.0, 1.5), (20.0, 3.0, 0.8)])
