@@ -112,6 +112,17 @@ def test_straight_down_when_slow():
     assert list(found.nodes) == [0]
 
 
+@pytest.mark.parametrize("short", [1e-3, 1e-4])
+def test_deepest_shape_without_nodes(short):
+    """Long and flung out, a cable without a fish hangs 2 ln 2 g/Omega^2 deep, and is 1 / (2^short - 1) R long."""
+    gamma = 1.3
+    found = cables_to_depth(0.0, gamma, 2 * np.log(2) / gamma**2 * (1 - short), 1e5)
+    assert list(found.nodes) == [0]
+    # What is neglected is of the order of 1 / a^2 but for a logarithm, and the tow radius.
+    assert found.lam[0] == pytest.approx(1 / (2**short - 1), rel=2 * short)
+    assert len(cables_to_depth(0.0, gamma, 2 * np.log(2) / gamma**2, 1e5)) == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "match"),
     [
@@ -183,6 +194,10 @@ def test_none_is_an_answer(ask):
     assert code == 4
     assert json.loads(out)["cables"] == []
     assert "no cable up to 0.9 m" in json.loads(out)["reason"]
+    scene = read_scene("skop-fig3")
+    groups = scene.groups("vacuum")
+    deepest = atlas.equilibria(0.9 / scene.radius, groups.w_f, 2.97).z_f.max() * scene.radius
+    assert f"the deepest of the longest one is at {deepest:.6g} m" in err
 
 
 def test_cables_without_transitions(ask):

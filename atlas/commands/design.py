@@ -10,6 +10,7 @@ import numpy as np
 from atlas.answers import Design, design
 from atlas.commands.common import NO_STATE, OK, add_atlas, announce_compilation, say
 from atlas.commands.scene import add_speed, atlas_if_any, describe_speed, quantity, scene_of
+from atlas.equilibria import equilibria
 
 
 def add(commands: Any) -> None:
@@ -107,9 +108,11 @@ def _rows(found: Design) -> list[dict[str, Any]]:
 def _reason(found: Design) -> str:
     scene, cables = found.scene, found.cables
     if not len(cables):
+        groups = scene.groups("vacuum")
+        deepest = float(equilibria(found.longest / scene.radius, groups.w_f, groups.gamma).z_f.max()) * scene.radius
         return (
-            f"no cable up to {found.longest:.4g} m has an equilibrium with the fish at {found.depth:.6g} m; a longer "
-            "one may, with --max-length"
+            f"no cable up to {found.longest:.4g} m has an equilibrium with the fish at {found.depth:.6g} m: the "
+            f"deepest of the longest one is at {deepest:.6g} m; a longer one may, with --max-length, or a slower tow"
         )
     nearest = int(np.argmin(np.abs(cables.x_f)))
     return (
