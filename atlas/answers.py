@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from atlas.checks import check_one
 from atlas.critical import solve_critical
-from atlas.equilibria import Equilibria, equilibria
+from atlas.equilibria import Equilibria, vacuum_equilibria
 from atlas.limits import transitions
 from atlas.lookup import Atlas
 from atlas.placement import Placements, cables_to_depth
@@ -162,7 +162,7 @@ def answer_scene(
     if not np.isfinite(groups.lam):
         raise ValueError(f"{scene.source}: cable.length is missing; a design finds one: towatlas design --help")
     jumps = critical_speeds(groups.lam, groups.w_f, groups.gamma, atlas, before_solving)
-    return SceneAnswer(scene=scene, jumps=jumps, equilibria=equilibria(groups.lam, groups.w_f, groups.gamma))
+    return SceneAnswer(scene=scene, jumps=jumps, equilibria=vacuum_equilibria(groups.lam, groups.w_f, groups.gamma))
 
 
 def design(

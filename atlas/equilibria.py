@@ -118,12 +118,14 @@ def equilibria(
     if not system.in_vacuum:
         # The vacuum of the report, m_f = w_f and w = 1, is where the equilibria are continued from.
         return solve_drag_equilibria(system, gamma, np.abs(_all_members(w_f, lam, gamma)[1].x_f))
-    return _vacuum_equilibria(lam, w_f, gamma)
+    return vacuum_equilibria(lam, w_f, gamma)
 
 
-def _vacuum_equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
+def vacuum_equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
+    """All equilibria in a vacuum; see `equilibria`."""
     from kernels.scan import forward_shots
 
+    lam, w_f, gamma = check_one("lam", lam), check_one("w_f", w_f, zero=True), check_one("gamma", gamma)
     nodes, found = _all_members(w_f, lam, gamma)
     order = np.argsort(found.R_x0)
     nodes, x_f, z_f, error = nodes[order], found.x_f[order], found.z_f[order], found.error[order]

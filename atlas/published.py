@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from atlas.critical import solve_critical
-from atlas.equilibria import equilibria
+from atlas.equilibria import vacuum_equilibria
 from atlas.limits import threshold_length
 
 SEGMENTS = 100  # of the report
@@ -101,7 +101,7 @@ def _secant(function: Callable[[float], float], guess: float) -> float:
 
 
 def _median(lam: float, w_f: float, gamma: float) -> float:
-    found = equilibria(lam, w_f, gamma)
+    found = vacuum_equilibria(lam, w_f, gamma)
     return float(found.R_x0[found.median][0])
 
 
@@ -144,7 +144,7 @@ def _number(lam: float, gamma: float, printed: int, figure: str) -> Published:
         printed,
         0,
         "=",
-        lambda: float(len(equilibria(lam, 0.0, gamma))),
+        lambda: float(len(vacuum_equilibria(lam, 0.0, gamma))),
         "The same.",
     )
 

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from atlas.branches import shoot_singly
 from atlas.checks import check_real, check_root
-from atlas.equilibria import Equilibria, equilibria
+from atlas.equilibria import Equilibria, vacuum_equilibria
 from kernels import status
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def shape(
     >>> [round(float(x), 6) for x in curve.x]
     [1.0, 0.335709, -1.703467]
     """
-    found = equilibria(lam, w_f, gamma)
+    found = vacuum_equilibria(lam, w_f, gamma)
     k = check_root(root, found.nodes, found.median)
     lam, w_f, gamma = found.lam, found.w_f, found.gamma
     if s is None:
