@@ -52,9 +52,8 @@ def seed(
     if rows < FEWEST_ROWS:
         return a, gamma, slopes
     with np.errstate(invalid="ignore", divide="ignore"):
-        sound = (
-            np.isfinite(lam) & np.isfinite(w_f) & (w_f >= 0.0) & (excess > 0.0) & (lam < MOST_ROUNDING * excess) & (n > 0)
-        )
+        sound = np.isfinite(lam) & np.isfinite(w_f) & (w_f >= 0.0) & (n > 0)
+        sound &= (excess > 0.0) & (lam < MOST_ROUNDING * excess)
     for order in np.unique(n[sound]):
         group = np.flatnonzero(sound & (n == order))
         if len(group) >= FEWEST_ROWS:

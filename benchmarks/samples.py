@@ -137,7 +137,7 @@ def exact_shots(a: Array, mu: Array, tau: Array) -> list[dict[str, str]]:
 
 
 def exact_folds(n: NDArray[np.int64], w_f: Array, lam: Array) -> list[dict[str, str]]:
-    """Critical speeds: the direct solution and one Newton step in 34 digits, which squares its error; rows of a file."""
+    """Critical speeds: the direct solution and a Newton step in 34 digits, which squares its error; rows of a file."""
     from mpmath import mp
 
     slow = _mpmath_shots()
