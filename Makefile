@@ -27,7 +27,8 @@ equilibria: install  ## build build/equilibria.nc, the table of fish positions
 test: install  ## run the tests
 	$(BIN)/python -m pytest
 
-bench: install  ## measure error and time, print the tables, update the one in the README
+bench: install  ## chart error against time, compare the ratios, update docs and README
+	-$(BIN)/pip install --quiet --disable-pip-version-check '.[peers]'
 	$(BIN)/python -m benchmarks
 
 failures: install  ## map where methods fail, write the figure and the tables of docs/failures.md

@@ -1,0 +1,132 @@
+"""The three charts: error against time, both logarithmic, failures marked."""
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from benchmarks.timing import LOST, Row
+
+FLOOR = 1e-17
+OURS = "#c1121f"
+COLOURS = ("#1f77b4", "#2a9d8f", "#e09f3e", "#6a4c93", "#7f7f7f", "#8c564b", "#0f4c5c", "#bc6c25", "#588157", "#d81b60")
+MARKERS = "osD^vP>X<p"
+plt.rcParams |= {"svg.hashsalt": "towatlas", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
+
+
+def _lines(rows: list[Row]) -> dict[str, list[Row]]:
+    lines: dict[str, list[Row]] = {}
+    for row in rows:
+        lines.setdefault(row.method, []).append(row)
+    return lines
+
+
+def panel(axes: Axes, rows: list[Row], name: str, ours: tuple[str, ...]) -> None:
+    """Median (small) and 99th percentile (large) of an error against time, one line a method, from median up to it."""
+    others = 0
+    for method, line in _lines([row for row in rows if name in row.errors]).items():
+        mine = method in ours
+        colour = OURS if mine else COLOURS[others % len(COLOURS)]
+        marker = "*" if mine else MARKERS[others % len(MARKERS)]
+        others += not mine
+        line = sorted(line, key=lambda row: row.microseconds)
+        time = np.array([row.microseconds for row in line])
+        median, high, worst = (
+            np.maximum([row.quantile(name, share) for row in line], FLOOR) for share in (0.5, 0.99, 1.0)
+        )
+        size = 12 if mine else 5.5
+        style = {"color": colour, "zorder": 5 if mine else 2}
+        axes.plot(time, high, "-", lw=1.2, marker=marker, ms=size, label=method, mec="white", mew=0.5, **style)
+        axes.vlines(time, median, worst, lw=0.8, alpha=0.6, **style)
+        axes.plot(time, median, "_", ms=7, **style)
+        lost = np.array([row.failure_rate > 0.0 for row in line])
+        axes.plot(time[lost], high[lost], "o", ms=size + 6, mfc="none", mec="black", mew=0.9, zorder=6)
+    axes.set(xscale="log", yscale="log")
+    axes.axhspan(LOST, axes.get_ylim()[1], color="0.93", zorder=0, lw=0)
+    axes.grid(True, which="major", lw=0.4, color="0.85")
+    axes.set_axisbelow(True)
+
+
+def _finish(figure: Figure, path: Path) -> None:
+    for suffix, extra in ((".svg", {"metadata": {"Date": None}}), (".png", {"dpi": 130})):
+        figure.savefig(path.with_suffix(suffix), bbox_inches="tight", **extra)  # type: ignore[arg-type]
+    plt.close(figure)
+
+
+KEY = (
+    "Symbol: 99th percentile; bar: median to largest. Ringed: some answers lost, "
+    f"none or off by more than {LOST:g} (grey). Below and left is better."
+)
+
+
+def shots(rows: list[Row], path: Path) -> None:
+    """First chart."""
+    figure, both = plt.subplots(1, 2, figsize=(12.5, 6.2), sharey=True, sharex=True)
+    for axes, name, title in zip(both, ("p", "q"), ("offset p", "its derivative q = dp/da"), strict=True):
+        panel(axes, rows, name, ("Taylor, this project",))
+        axes.set_title(f"Error of the {title}", loc="left")
+        axes.set_xlabel("time per shot, with derivative [us], one thread")
+    both[0].set_ylim(FLOOR * 3, 1e4)
+    both[0].set_ylabel("error over the local amplitude [-]")
+    handles, labels = both[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="center left", bbox_to_anchor=(0.91, 0.5), frameon=False)
+    figure.text(0.125, 0.0, KEY + " RK4 forward has no derivative.", fontsize=8.5)
+    _finish(figure, path)
+
+
+def folds(rows: list[Row], path: Path) -> None:
+    """Second chart."""
+    figure, axes = plt.subplots(figsize=(8.5, 5.6))
+    panel(axes, rows, "gamma", ("direct, table", "direct, one by one", "lookup from the atlas"))
+    axes.set(xlabel="time per critical speed [us], one thread", ylabel="relative error of gamma_cn [-]")
+    axes.set_ylim(FLOOR * 3, 1e2)
+    marks = {
+        "direct, table": "direct, table of 4000",
+        "direct, one by one": "direct, one a call",
+        "lookup from the atlas": "lookup",
+    }
+    for row in rows:
+        if row.method in marks:
+            place = (row.microseconds, max(row.quantile("gamma", 0.99), FLOOR))
+            axes.annotate(marks[row.method], place, (8, 8), textcoords="offset points", color=OURS)
+        elif row.failure_rate > 0.0:
+            place = (row.microseconds, row.quantile("gamma", 0.99))
+            axes.annotate(f"{row.failure_rate:.0%} lost", place, (9, -3), textcoords="offset points", fontsize=8)
+    handles, labels = axes.get_legend_handles_labels()
+    kept = [(h, text) for h, text in zip(handles, labels, strict=True) if text not in marks]
+    axes.legend(*zip(*kept, strict=True), loc="lower right", frameon=False)
+    axes.set_title("Critical speeds from cold, over the whole domain of the atlas", loc="left")
+    figure.text(0.1, -0.02, KEY, fontsize=8)
+    _finish(figure, path)
+
+
+def lookup(rows: list[Row], path: Path) -> None:
+    """Third chart."""
+    figure, both = plt.subplots(1, 2, figsize=(12, 5), sharey=True)
+    for axes, one in zip(both, (False, True), strict=True):
+        part = [row for row in rows if (row.setting == "one point") == one]
+        panel(axes, part, "gamma", ("this project",))
+        for row in part:
+            right = row.microseconds < np.median([other.microseconds for other in part])
+            axes.annotate(
+                row.method,
+                (row.microseconds, row.quantile("gamma", 0.99)),
+                (9 if right else -9, 6),
+                textcoords="offset points",
+                ha="left" if right else "right",
+                color=OURS if row.method == "this project" else "black",
+                fontsize=8.5,
+            )
+        axes.set_xlabel("time per point [us]")
+        axes.set_title("one point a call" if one else f"{part[0].setting} a call", loc="left")
+        low, high = (f([row.microseconds for row in part]) for f in (min, max))
+        axes.set_xlim(low / 2.5, high * 2.5)
+    both[0].set_ylim(FLOOR * 3, 1.0)
+    both[0].set_ylabel("relative error of gamma_c1 [-]")
+    figure.text(0.125, -0.03, KEY + " The same 96 x 112 nodes for all.", fontsize=8.5)
+    _finish(figure, path)
