@@ -131,21 +131,22 @@ def rk4_fish_up(variable: str, a: Array, mu: Array, tau: Array, length: Array, s
 def _lengths(a, mu, tau, length):
     for i in range(len(a)):
         paid, f, p, _, v, q, _ = start(a[i], mu[i], tau[i])
-        total = 0.0
+        total, low, high, forced = 0.0, 0.0, 0.0, 0.0
         while True:
-            dt, _, f_new, p_new, v_new, q_new, h = taylor_step(mu[i] + paid, f, p, v, q, 0.0)
-            if paid + dt >= tau[i]:
-                break
-            paid, f, p, v, q = paid + dt, f_new, p_new, v_new, q_new
-            total += h
-        low, high = 0.0, h
-        for _ in range(60):
-            middle = 0.5 * (low + high)
-            dt = taylor_step(mu[i] + paid, f, p, v, q, middle)[0] if middle > 0.0 else 0.0
-            if paid + dt < tau[i]:
-                low = middle
+            dt, _, f_new, p_new, v_new, q_new, h = taylor_step(mu[i] + paid, f, p, v, q, forced)
+            beyond = paid + dt >= tau[i]
+            if forced == 0.0 and not beyond:
+                paid, f, p, v, q = paid + dt, f_new, p_new, v_new, q_new
+                total += h
+                continue
+            # From here on the step that overshoots is bisected.
+            if beyond:
+                high = h
             else:
-                high = middle
+                low = h
+            forced = 0.5 * (low + high)
+            if high - low <= 1e-16 * (total + high) or not low < forced < high:
+                break
         length[i] = total + high
 
 

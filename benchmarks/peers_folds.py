@@ -61,14 +61,14 @@ def by_root(n: int, w_f: float, lam: float, rtol: float) -> float:
         warnings.simplefilter("ignore")
         try:
             found = root(residual, guess(n, w_f, lam), tol=1e-12, options={"maxfev": 60})
-        except OutOfPatienceError:
+        except (OutOfPatienceError, ValueError):  # the latter from solve_ivp, for a state that overflowed
             return np.nan
     # By its own tolerance `root` may end short of success at the rounding of the shots: judged by what is left.
     return float(np.exp(found.x[1])) if np.abs(found.fun).max() < max(1e-8, 10.0 * rtol) else np.nan
 
 
 def solve_extended(
-    n: int, w_f: float, lam: float, mesh: Array, y: Array, parameters: Array, tolerance: float
+    n: int, w_f: float, lam: float, mesh: Array, y: Array, parameters: Array, tolerance: float, max_nodes: int
 ) -> tuple[float, Array, Array, Array]:
     """gamma_cn, mesh, state and parameters by `solve_bvp` on (p, f, q, v) with log a and log gamma unknown."""
     sign = 1.0 if n % 2 == 0 else -1.0
@@ -86,7 +86,7 @@ def solve_extended(
             y,
             p=parameters,
             tol=tolerance,
-            max_nodes=MAX_NODES,
+            max_nodes=max_nodes,
         )
     return float(np.exp(found.p[1])) if found.success else np.nan, found.x, found.y, found.p
 
@@ -112,7 +112,7 @@ def by_bvp(n: int, w_f: float, lam: float, tolerance: float) -> float:
     """gamma_cn by `solve_bvp` from the closed-form guess; nan where it gives up."""
     parameters = np.array(guess(n, w_f, lam))
     mesh, y = first_state(w_f, lam, parameters)
-    return solve_extended(n, w_f, lam, mesh, y, parameters, tolerance)[0]
+    return solve_extended(n, w_f, lam, mesh, y, parameters, tolerance, MAX_NODES)[0]
 
 
 def bvp_curve(n: int, w_f: float, lam: Array, parameters: Array, tolerance: float) -> Array:
@@ -120,5 +120,7 @@ def bvp_curve(n: int, w_f: float, lam: Array, parameters: Array, tolerance: floa
     mesh, y = first_state(w_f, float(lam[0]), parameters)
     gamma = np.empty(len(lam))
     for i, length in enumerate(lam):
-        gamma[i], mesh, y, parameters = solve_extended(n, w_f, float(length), mesh, y, parameters, tolerance)
+        gamma[i], mesh, y, parameters = solve_extended(
+            n, w_f, float(length), mesh, y, parameters, tolerance, 10 * MAX_NODES
+        )
     return gamma
