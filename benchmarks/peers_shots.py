@@ -2,6 +2,7 @@
 
 import importlib.util
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numba
@@ -41,8 +42,9 @@ def scipy_shots(a: Array, mu: Array, tau: Array, method: str, rtol: float) -> tu
     return np.array(ends)[:, 1], np.array(ends)[:, 3]
 
 
-def cyrk_shots(rtol: float) -> Callable[[Array, Array, Array], tuple[Array, Array]]:
-    """CyRK's DOP853 called from compiled code."""
+@cache
+def _cyrk_loop() -> Callable:
+    """CyRK's DOP853 called from compiled code, one shot after the other."""
     from CyRK import nbsolve_ivp
 
     @numba.njit
@@ -51,7 +53,7 @@ def cyrk_shots(rtol: float) -> Callable[[Array, Array, Array], tuple[Array, Arra
         return np.array([y[1], -y[0] / r, y[3], -t * t * y[2] / r**3])
 
     @numba.njit
-    def loop(states, end, ends):
+    def loop(states, end, rtol, ends):
         for i in range(len(end)):
             found = nbsolve_ivp(
                 slopes, (states[0, i], end[i]), states[1:, i].copy(), rtol=rtol, atol=1e-14, rk_method=2, warnings=False
@@ -59,12 +61,14 @@ def cyrk_shots(rtol: float) -> Callable[[Array, Array, Array], tuple[Array, Arra
             for j in range(4):
                 ends[i, j] = found.y[j, -1] if found.success else np.nan
 
-    def shots(a: Array, mu: Array, tau: Array) -> tuple[Array, Array]:
-        ends = np.empty((len(a), 4))
-        loop(starts(a, mu, tau), mu + tau, ends)
-        return ends[:, 1], ends[:, 3]
+    return loop
 
-    return shots
+
+def cyrk_shots(a: Array, mu: Array, tau: Array, rtol: float) -> tuple[Array, Array]:
+    """CyRK's DOP853."""
+    ends = np.empty((len(a), 4))
+    _cyrk_loop()(starts(a, mu, tau), mu + tau, rtol, ends)
+    return ends[:, 1], ends[:, 3]
 
 
 class Heyoka:

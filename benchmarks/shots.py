@@ -58,7 +58,9 @@ def measure(rows: int = 600, slow_rows: int = 24, full: bool = True) -> list[Row
     absent = peers.missing()
     if full and "CyRK" not in absent:  # it takes ten seconds to compile
         for rtol in tolerances:
-            found.append(_row("CyRK DOP853", f"rtol {rtol:g}", exact.head(100), peers.cyrk_shots(rtol)))
+            found.append(
+                _row("CyRK DOP853", f"rtol {rtol:g}", exact.head(100), lambda *shot, r=rtol: peers.cyrk_shots(*shot, r))
+            )
     if "heyoka" not in absent:
         for variable in ("t", "sigma"):
             for tolerance in (1e-5, 1e-10, 2.2e-16) if full else (2.2e-16,):
