@@ -14,8 +14,35 @@ from benchmarks.timing import LOST, Row
 
 FLOOR = 1e-17
 OURS = "#c1121f"
-COLOURS = ("#1f77b4", "#2a9d8f", "#e09f3e", "#6a4c93", "#7f7f7f", "#8c564b", "#0f4c5c", "#bc6c25", "#588157", "#d81b60")
-MARKERS = "osD^vP>X<p"
+# One colour and marker a method, the same in every panel; relatives share a hue.
+STYLES = {
+    "Taylor, this project": (OURS, "*"),
+    "Taylor, other orders": ("#f08080", "o"),
+    "RK4 forward (Skop)": ("black", "v"),
+    "RK4 fish-up in t": ("#0b3c8c", "s"),
+    "RK4 fish-up in sqrt(t)": ("#2f7ed8", "D"),
+    "RK4 fish-up in sigma": ("#74b3f0", "^"),
+    "order 8, fixed": ("#b08968", "P"),
+    "order 8, adaptive": ("#6f4518", "X"),
+    "SciPy DOP853": ("#e07a00", ">"),
+    "SciPy LSODA": ("#f4b942", "<"),
+    "CyRK DOP853": ("#d81b60", "p"),
+    "heyoka in t, scalar": ("#8fd19e", "h"),
+    "heyoka in t, batch of 8": ("#1b7f3b", "H"),
+    "heyoka in sigma, scalar": ("#b9a0dc", "h"),
+    "heyoka in sigma, batch of 8": ("#5e3c99", "H"),
+    "direct, table": (OURS, "*"),
+    "direct, one by one": (OURS, "*"),
+    "lookup from the atlas": (OURS, "*"),
+    "Skop's scan": ("black", "v"),
+    "SciPy solve_ivp + root": ("#1b7f3b", "s"),
+    "SciPy solve_bvp": ("#e07a00", "D"),
+    "this project": (OURS, "*"),
+    "RegularGridInterpolator linear": ("#2f7ed8", "s"),
+    "RegularGridInterpolator cubic": ("#0b3c8c", "D"),
+    "RectBivariateSpline": ("#1b7f3b", "^"),
+    "xarray.interp linear": ("#e07a00", "v"),
+}
 plt.rcParams |= {"svg.hashsalt": "towatlas", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
 
 
@@ -26,15 +53,11 @@ def _lines(rows: list[Row]) -> dict[str, list[Row]]:
     return lines
 
 
-def panel(axes: Axes, rows: list[Row], name: str, ours: tuple[str, ...]) -> None:
-    """Median (small) and 99th percentile (large) of an error against time, one line a method, from median up to it."""
-    others = 0
+def panel(axes: Axes, rows: list[Row], name: str) -> None:
+    """Errors against time, one line a method through its 99th percentiles in the order of its settings."""
     for method, line in _lines([row for row in rows if name in row.errors]).items():
-        mine = method in ours
-        colour = OURS if mine else COLOURS[others % len(COLOURS)]
-        marker = "*" if mine else MARKERS[others % len(MARKERS)]
-        others += not mine
-        line = sorted(line, key=lambda row: row.microseconds)
+        colour, marker = STYLES[method]
+        mine = marker == "*"
         time = np.array([row.microseconds for row in line])
         median, high, worst = (
             np.maximum([row.quantile(name, share) for row in line], FLOOR) for share in (0.5, 0.99, 1.0)
@@ -67,9 +90,11 @@ KEY = (
 def shots(rows: list[Row], path: Path) -> None:
     """First chart."""
     figure, both = plt.subplots(1, 2, figsize=(12.5, 6.2), sharey=True, sharex=True)
-    for axes, name, title in zip(both, ("p", "q"), ("offset p", "its derivative q = dp/da"), strict=True):
-        panel(axes, rows, name, ("Taylor, this project",))
-        axes.set_title(f"Error of the {title}", loc="left")
+    for axes, name, title in zip(
+        both, ("p", "q"), ("Error of the offset p", "Error of its derivative q = dp/da"), strict=True
+    ):
+        panel(axes, rows, name)
+        axes.set_title(title, loc="left")
         axes.set_xlabel("time per shot, with derivative [us], one thread")
     both[0].set_ylim(FLOOR * 3, 1e4)
     both[0].set_ylabel("error over the local amplitude [-]")
@@ -82,7 +107,7 @@ def shots(rows: list[Row], path: Path) -> None:
 def folds(rows: list[Row], path: Path) -> None:
     """Second chart."""
     figure, axes = plt.subplots(figsize=(8.5, 5.6))
-    panel(axes, rows, "gamma", ("direct, table", "direct, one by one", "lookup from the atlas"))
+    panel(axes, rows, "gamma")
     axes.set(xlabel="time per critical speed [us], one thread", ylabel="relative error of gamma_cn [-]")
     axes.set_ylim(FLOOR * 3, 1e2)
     marks = {
@@ -119,23 +144,14 @@ def lookup(rows: list[Row], path: Path) -> None:
     figure, both = plt.subplots(1, 2, figsize=(12, 5), sharey=True)
     for axes, one in zip(both, (False, True), strict=True):
         part = [row for row in rows if (row.setting == "one point") == one]
-        panel(axes, part, "gamma", ("this project",))
-        for row in part:
-            right = row.microseconds < np.median([other.microseconds for other in part])
-            axes.annotate(
-                row.method,
-                (row.microseconds, row.quantile("gamma", 0.99)),
-                (9 if right else -9, 6),
-                textcoords="offset points",
-                ha="left" if right else "right",
-                color=OURS if row.method == "this project" else "black",
-                fontsize=8.5,
-            )
+        panel(axes, part, "gamma")
         axes.set_xlabel("time per point [us]")
         axes.set_title("one point a call" if one else f"{part[0].setting} a call", loc="left")
         low, high = (f([row.microseconds for row in part]) for f in (min, max))
         axes.set_xlim(low / 2.5, high * 2.5)
     both[0].set_ylim(FLOOR * 3, 1.0)
     both[0].set_ylabel("relative error of gamma_c1 [-]")
+    handles, labels = both[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="center left", bbox_to_anchor=(0.91, 0.5), frameon=False)
     figure.text(0.125, -0.03, KEY + " The same 96 x 112 nodes for all.", fontsize=8.5)
     _finish(figure, path)
