@@ -40,10 +40,11 @@ check: install  ## ruff, types, import layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-figures: install  ## draw the figures of the README from build/atlas.nc
+figures: install  ## draw the figures of the README from build/atlas.nc, and of NRL Report 7048 (build/report.html)
 	@test -f $(ATLAS) || $(MAKE) --no-print-directory atlas
 	$(BIN)/python -m atlas plot critical --atlas $(ATLAS) --out docs/critical.svg
 	$(BIN)/python -m atlas plot critical --atlas $(ATLAS) --out docs/critical.png
+	$(BIN)/python -m atlas report --out build/report.html
 
 clean:  ## remove .venv, build and caches
 	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
