@@ -38,8 +38,8 @@ def chart_table(rows: list[Row], method: str, quantities: Iterable[str]) -> str:
     for row in rows:
         cells = [row.method, row.setting]
         for name in names:
-            shares = " / ".join(f"{row.quantile(name, share):.0e}" for share in (0.5, 0.99, 1.0))
-            cells.append(shares if name in row.errors else "")
+            shares = [row.quantile(name, share) for share in (0.5, 0.99, 1.0)] if name in row.errors else []
+            cells.append(" / ".join(f"{share:.0e}" for share in shares))
         lost = f"{row.failure_rate:.1%}" if row.failure_rate else "0"
         cells.append(f"{lost} ({row.failures})" if row.failures else lost)
         ratio = row.microseconds / unit(rows, method)

@@ -110,6 +110,9 @@ def test_figures_and_tables(shot_rows, tmp_path, monkeypatch):
         lines = list(csv.DictReader(line for line in file if not line.startswith("#")))
     assert len(lines) == len(rows)
     assert float(lines[0]["ratio"]) == 1.0
+    table = report.chart_table(rows, shots.REFERENCE_METHOD, ["p", "q"]).splitlines()
+    assert len(table) == 2 + len(rows)
+    assert len({line.count("|") for line in table}) == 1
     document = tmp_path / "page.md"
     document.write_text("a\n<!-- x: written by make bench -->\nold\n<!-- end of x -->\nb\n")
     report.put(document, "x", "new\n")
