@@ -62,7 +62,7 @@ def main() -> int:
     found += targets.of_shots(shot_rows) + targets.of_forward_shots()
     _say("critical speeds ...")
     fold_rows = folds.measure(table)
-    found += targets.of_folds()
+    found += targets.of_tables(fold_rows) + targets.of_folds()
     _say("lookup ...")
     lookup_rows, construct = lookup.measure(table)
     found += targets.of_lookup(lookup_rows)

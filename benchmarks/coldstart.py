@@ -25,10 +25,10 @@ timed("first critical speed (solve_folds)", lambda: atlas.solve_critical(10.0, 1
 timed("the same again", lambda: atlas.solve_critical(10.0, 1.0))
 timed("first curve (seed_folds)", lambda: atlas.solve_critical(np.geomspace(8, 50, 100), 1.0))
 timed("first table (solve_folds, parallel)", lambda: atlas.solve_critical(np.geomspace(8, 50, 300), 1.0))
-timed("first equilibria of a cable", lambda: atlas.equilibria(37.8, 1352, gamma=5.94))
 from kernels.scan import forward_shots, scan_system
 one, out = np.ones(1), [np.empty(1) for _ in range(3)]
 timed("forward_shots", lambda: forward_shots(one, one, one, one, 10, *out, 0, 1))
+timed("first equilibria of a cable", lambda: atlas.equilibria(37.8, 1352, gamma=5.94))
 found = np.empty((1, 4)), np.empty(1, np.int64)
 timed("scan_system", lambda: scan_system(1.0, 10.0, 0.3, 0.9, 8, 64, 10, 1, 1e-3, *found))
 print(json.dumps(times))

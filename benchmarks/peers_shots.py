@@ -74,15 +74,15 @@ def cyrk_shots(a: Array, mu: Array, tau: Array, rtol: float) -> tuple[Array, Arr
 class Heyoka:
     """heyoka's Taylor integrator, one shot at a time or BATCH at once, in t or in sigma.
 
-    In sigma the equations are those of kernels.steppers, without root or division, and every shot is told its length,
-    which a user would have to find by an event. Batches take shots sorted by their number of steps, so that no lane
-    waits long for another.
+    In sigma the equations are those of kernels.steppers, without root or division. With `event` a shot in sigma ends
+    where t says so; without, it is told its length, which a user would not know. Batches take shots sorted by their
+    number of steps, so that no lane waits long for another; they know no event, which would stop all lanes at once.
     """
 
-    def __init__(self, variable: str, tolerance: float = 2.2e-16):
+    def __init__(self, variable: str, tolerance: float = 2.2e-16, event: bool = False):
         import heyoka as hy
 
-        self.in_sigma = variable == "sigma"
+        self.in_sigma, self.event = variable == "sigma", event
         if self.in_sigma:
             p, f, t, H, q, v, h, k = hy.make_vars("p", "f", "t", "H", "q", "v", "h", "k")
             r, g = H - 0.5 * p * p, h - p * q
@@ -92,7 +92,11 @@ class Heyoka:
             r2 = hy.time**2 + f**2
             system = [(f, p), (p, -f * r2**-0.5), (v, q), (q, -(hy.time**2) * v * r2**-1.5)]
         rows = len(system)
-        self.one = hy.taylor_adaptive(system, np.ones(rows), tol=tolerance)
+        options: dict[str, Any] = {"tol": tolerance}
+        if event:
+            end = hy.t_event(t - hy.par[0], direction=hy.event_direction.positive)
+            options |= {"t_events": [end], "pars": [1.0]}
+        self.one = hy.taylor_adaptive(system, np.ones(rows), **options)
         self.many = hy.taylor_adaptive_batch(system, np.ones((rows, BATCH)), tol=tolerance)
 
     def _begin(self, a: Array, mu: Array, tau: Array, length: Array) -> tuple[Array, Array, Array]:
@@ -121,7 +125,10 @@ class Heyoka:
         for i in range(len(a)):
             one.time = begin[i]
             one.state[:] = states[:, i]
-            steps[i] = one.propagate_until(far[i])[3]
+            if self.event:
+                one.pars[0] = mu[i] + tau[i]
+                one.reset_cooldowns()
+            steps[i] = one.propagate_until(1e300 if self.event else far[i])[3]
             ends[:, i] = one.state
         return *self._answer(ends, mu + tau), steps
 

@@ -65,6 +65,13 @@ def measure(rows: int = 600, slow_rows: int = 24, full: bool = True) -> list[Row
         for variable in ("t", "sigma"):
             for tolerance in (1e-5, 1e-10, 2.2e-16) if full else (2.2e-16,):
                 found += _heyoka(exact, length, variable, tolerance)
+        for tolerance in (1e-5, 1e-10, 2.2e-16) if full else (2.2e-16,):
+            integrator = peers.Heyoka("sigma", tolerance, event=True)
+
+            def to_event(*shot: np.ndarray, integrator: peers.Heyoka = integrator) -> tuple:
+                return integrator.scalar(*shot, length)[:2]
+
+            found.append(_row("heyoka in sigma, scalar, event", f"tol {tolerance:g}", exact, to_event, fast=True))
     return found
 
 
