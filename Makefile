@@ -28,7 +28,7 @@ test: install  ## run the tests
 	$(BIN)/python -m pytest
 
 bench: install  ## chart error against time, compare the ratios, update docs and README
-	-$(BIN)/pip install --quiet --disable-pip-version-check '.[peers]'
+	-$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[peers]'
 	$(BIN)/python -m benchmarks
 
 failures: install  ## map where methods fail, write the figure and the tables of docs/failures.md
