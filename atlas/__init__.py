@@ -5,6 +5,7 @@ Importing this package, opening an atlas and looking a value up need numpy and n
 """
 
 from atlas.critical import CriticalStates, solve_critical
+from atlas.drag import DragEquilibria, DragShape, drag_shape
 from atlas.equilibria import Equilibria, equilibria
 from atlas.limits import excess_length, massless_cable, threshold_length
 from atlas.lookup import Atlas, open_atlas
@@ -15,7 +16,10 @@ __all__ = [
     "Atlas",
     "AtlasFileError",
     "CriticalStates",
+    "DragEquilibria",
+    "DragShape",
     "Equilibria",
+    "drag_shape",
     "equilibria",
     "excess_length",
     "massless_cable",

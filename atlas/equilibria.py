@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from atlas.branches import Members, extrema, shoot_lanes, shoot_singly, solve_members
 from atlas.checks import check_one
+from atlas.drag import DragEquilibria, check_system, solve_drag_equilibria
 from kernels import status
 
 # Segments of the forward shot that bears witness to each root.
@@ -43,8 +44,17 @@ class Equilibria:
         return len(self.R_x0)
 
 
-def equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
-    """All equilibria of a cable towed in a vacuum.
+def equilibria(
+    lam: float,
+    w_f: float,
+    gamma: float,
+    C: float = 0.0,
+    m_f: float | None = None,
+    C_f: float = 0.0,
+    w: float = 1.0,
+    C_t: float = 0.0,
+) -> Equilibria | DragEquilibria:
+    """Equilibria of a towed cable: all of them in a vacuum, those that a search finds in a fluid.
 
     Parameters
     ----------
@@ -54,11 +64,24 @@ def equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
         Fish weight over (mu + rho A) g R [-], >= 0.
     gamma : float
         Rotational frequency Omega sqrt(R/g) [-], > 0.
+    C : float
+        Drag constant of the cable, (1/2) rho C_D d R / (mu + rho A) [-], >= 0.
+    m_f : float, optional
+        Fish mass over (mu + rho A) R [-], >= 0; equal to w_f by default, the report's nondense fluid.
+    C_f : float
+        Drag constant of the fish, (1/2) rho C_Df A_f / (mu + rho A) [-], >= 0.
+    w : float
+        Weight of the cable, (mu - rho A) / (mu + rho A) [-], above -1, at most 1; 1 in a nondense fluid.
+    C_t : float
+        Tangential drag constant of the cable, as C with the coefficient of the flow along it [-], >= 0.
 
     Returns
     -------
     Equilibria
-        All of them, an odd number.
+        In a vacuum, where the last five have their defaults: all of them, an odd number.
+    DragEquilibria
+        In a fluid: those that continuation from a vacuum and a search in the radius of the fish find. Completeness is
+        not proved; `searched` says what was searched.
 
     Raises
     ------
@@ -69,22 +92,34 @@ def equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
 
     Notes
     -----
-    Complete by construction: the offsets at which the number of zeros of q = dp/da along the shot changes separate
-    monotone pieces of p(t_e; a), each of which holds at most one equilibrium and one mirrored one. Their number is
-    1 + 2 #{n : gamma > gamma_cn}.
+    In a vacuum complete by construction: the offsets at which the number of zeros of q = dp/da along the shot changes
+    separate monotone pieces of p(t_e; a), each of which holds at most one equilibrium and one mirrored one. Their
+    number is 1 + 2 #{n : gamma > gamma_cn}.
 
     References
     ----------
-    NRL Report 7048, Eqs. (29)-(35); median root, section "The character of the solutions for lambda > lambda_c".
+    NRL Report 7048, Eqs. (29)-(35), with drag (12)-(23); median root, section "The character of the solutions for
+    lambda > lambda_c".
 
     Examples
     --------
     >>> [round(float(r), 3) for r in equilibria(37.8, 1352, 2.97).R_x0]
     [-444837.738, 552.265, 469356.532]
+    >>> found = equilibria(37.8, 1352, 2.97, C=0.018)
+    >>> [round(float(r), 4) for r in found.r_f], [int(n) for n in found.nodes]
+    ([0.0435, 36.8139, 38.7821], [1, 1, 0])
     """
+    lam, w_f, gamma = check_one("lam", lam), check_one("w_f", w_f, zero=True), check_one("gamma", gamma)
+    system = check_system(lam, w_f, C, m_f, C_f, w, C_t)
+    if not system.in_vacuum:
+        # The vacuum of the report, m_f = w_f and w = 1, is where the equilibria are continued from.
+        return solve_drag_equilibria(system, gamma, np.abs(_all_members(w_f, lam, gamma)[1].x_f))
+    return _vacuum_equilibria(lam, w_f, gamma)
+
+
+def _vacuum_equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
     from kernels.scan import forward_shots
 
-    lam, w_f, gamma = check_one("lam", lam), check_one("w_f", w_f, zero=True), check_one("gamma", gamma)
     nodes, found = _all_members(w_f, lam, gamma)
     order = np.argsort(found.R_x0)
     nodes, x_f, z_f, error = nodes[order], found.x_f[order], found.z_f[order], found.error[order]

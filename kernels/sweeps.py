@@ -5,8 +5,10 @@ bit for any number of threads. One parallel call costs about a millisecond: for 
 """
 
 import numba
+import numpy as np
 
 from kernels.compiling import parallel_kernel
+from kernels.drag import STATE, shoot_drag
 from kernels.extract import solve_folds
 from kernels.scan import forward_shots, scan_system
 from kernels.shots import march
@@ -15,6 +17,7 @@ from kernels.shots import march
 SHOTS_BLOCK = 256
 FOLDS_BLOCK = 128
 FORWARD_BLOCK = 1024
+DRAG_BLOCK = 16
 
 
 def _march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts, statuses):
@@ -58,7 +61,19 @@ def _scan_systems(w_f, lam, gamma_low, gamma_high, speeds, guesses, segments, n_
         )
 
 
+def _shoot_drag(r, gamma2, systems, shares, jets, places, degree, max_steps, results, steps, statuses):
+    none = np.empty((0, STATE - 1))
+    rows = len(r)
+    for block in numba.prange((rows + DRAG_BLOCK - 1) // DRAG_BLOCK):
+        begin = block * DRAG_BLOCK
+        stop = min(rows, begin + DRAG_BLOCK)
+        shoot_drag(
+            r, gamma2, systems, shares, jets, places, degree, max_steps, none, results, steps, statuses, begin, stop
+        )
+
+
 march_parallel = parallel_kernel(_march)
 solve_folds_parallel = parallel_kernel(_solve_folds)
 forward_shots_parallel = parallel_kernel(_forward_shots)
 scan_systems_parallel = parallel_kernel(_scan_systems)
+shoot_drag_parallel = parallel_kernel(_shoot_drag)

@@ -41,6 +41,13 @@ def weight(text: str) -> float:
     return value
 
 
+def drag(text: str) -> float:
+    value = number(text)
+    if value < 0.0:
+        raise argparse.ArgumentTypeError(f"{text} is negative: drag constants are not")
+    return value
+
+
 def order(text: str) -> int:
     try:
         value = int(text)
