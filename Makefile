@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 ATLAS := build/atlas.nc
 
 .DEFAULT_GOAL := help
-.PHONY: help install atlas test bench check figures clean
+.PHONY: help install atlas equilibria test bench failures check figures clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
@@ -21,11 +21,17 @@ $(VENV)/installed: pyproject.toml
 atlas: install  ## build build/atlas.nc
 	$(BIN)/python -m atlas build --out $(ATLAS)
 
+equilibria: install  ## build build/equilibria.nc, the table of fish positions
+	$(BIN)/python -m atlas build --equilibria
+
 test: install  ## run the tests
 	$(BIN)/python -m pytest
 
 bench: install  ## measure error and time, print the tables, update the one in the README
 	$(BIN)/python -m benchmarks
+
+failures: install  ## map where methods fail, write the figure and the tables of docs/failures.md
+	$(BIN)/python -m benchmarks.failures
 
 check: install  ## ruff, types, import layers
 	$(BIN)/ruff check .

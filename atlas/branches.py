@@ -28,6 +28,7 @@ BEYOND = 1.01
 ROUNDS = 200
 MAX_STEPS = 10**7
 EPS = 2.0**-52
+TINY = 1e-140
 # Steps in log a: one below this is made on the results instead of by another shot, the square of it being rounding.
 LAST_STEP = 1e-8
 # A step this much shorter than the way to the extremum is known to the square of it, and its root is no mirage.
@@ -124,8 +125,10 @@ def solve_members(
     low_end, high_end = np.full((3, rows), np.nan), np.full((3, rows), np.nan)
     x_old, slope_old, step_old = (np.full(rows, np.nan) for _ in range(3))
     results = np.full((rows, 5), np.nan)
-    codes = np.full(rows, status.NOT_CONVERGED)
-    i = np.arange(rows)
+    # Products this small have lost digits to underflow, or will have.
+    tiny = np.minimum(gamma2, tau) < TINY
+    codes = np.where(tiny, status.BAD_INPUT, status.NOT_CONVERGED)
+    i = np.flatnonzero(~tiny)
     for round_ in range(ROUNDS):
         if not len(i):
             break
@@ -165,6 +168,12 @@ def solve_members(
             results[k] = _finish(a[found], shift, ends[found], counts[found], mu[k], gamma2[k], sign[k], slope[found])
         x[i] = np.where(astray, 0.5 * (low[i] + high[i]), trial)
         i = i[~(found | absent | failed)]
+    # A fish deeper than the cable is long is arithmetic that gave out, too.
+    with np.errstate(invalid="ignore"):
+        sound = np.isfinite(results).all(axis=1) & (results[:, 3] <= 1.001 * lam)
+    overflowed = (codes == status.OK) & ~sound
+    codes[overflowed] = status.BAD_INPUT
+    results[overflowed] = np.nan
     a, r_x0, x_f, z_f, error = results.T
     return Members(a, r_x0, x_f, z_f, error, codes)
 
@@ -224,7 +233,12 @@ def _finish(
     tau, f, p, z, v, q = ends.T
     t = mu + tau
     # z = H(end) - H(start) with H = r + p^2 / 2.
-    z_slope = f * v / np.hypot(t, f) + p * q - mu * a / np.hypot(1.0, a) - a
+    terms = np.stack([f * v / np.hypot(t, f), p * q, -mu * a / np.hypot(1.0, a), -a])
+    # Under a heavy fish, and on a short fast cable, their sum is rounding. Little changes then along the cable, and
+    # the integral of dz/dt has hardly more than its ends.
+    noisy = EPS * a * np.abs(terms).sum(axis=0) > 0.1 * tau
+    ends_only = -0.5 * tau * (a / (1.0 + a * a) ** 1.5 + (f / t) * (v / t) / (1.0 + (f / t) ** 2) ** 1.5)
+    z_slope = np.where(noisy, ends_only, terms.sum(axis=0))
     da = a * shift
     scale = sign / gamma2
     # What rounding of p, of the local amplitude of the wave, moves the root.

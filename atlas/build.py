@@ -57,7 +57,8 @@ class Summary:
 
 
 @contextmanager
-def _threads(count: int | None) -> Iterator[None]:
+def limited_threads(count: int | None) -> Iterator[None]:
+    """All parallel kernels within the block run on so many threads; None for all there are."""
     before = numba.get_num_threads()
     limit = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
     if count is not None:
@@ -107,22 +108,23 @@ def build_atlas(
     grid = grid or Grid()
     scan = scan or (ScanSettings() if method == "fold" else WHOLE_SCAN)
     total = scan.size + (grid.size if method == "fold" else 0)
-    with _threads(threads), tqdm(total=total, unit="fold", disable=not progress, leave=False) as bar:
+    with limited_threads(threads), tqdm(total=total, unit="fold", disable=not progress, leave=False) as bar:
         if method == "fold":
             root, groups, facts = _build_fold(grid, scan, bar)
         else:
             root, groups, facts = _build_scan(scan, bar)
         bar.set_description("writing")
-        root.attrs = root_attributes(method, _provenance(method) | facts.pop("attributes"))
+        root.attrs = root_attributes(method, provenance(f"--method {method}") | facts.pop("attributes"))
         write_atlas(path, root, groups)
     return Summary(path=path, method=method, seconds=time.perf_counter() - start, bytes=path.stat().st_size, **facts)
 
 
-def _provenance(method: str) -> dict[str, Any]:
+def provenance(options: str) -> dict[str, Any]:
+    """Attributes that say with what a file was built; nothing in them depends on the machine or the hour."""
     versions = " ".join(
         f"{name} {importlib.metadata.version(name)}" for name in ("numpy", "numba", "xarray", "netCDF4")
     )
-    command = f"python -m atlas build --method {method}"
+    command = f"python -m atlas build {options}"
     attributes = {
         "schema_version": np.int32(SCHEMA_VERSION),
         "towatlas_version": importlib.metadata.version("towatlas"),

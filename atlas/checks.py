@@ -51,11 +51,16 @@ def check_broadcast(**arrays: NDArray) -> list[NDArray]:
         raise ValueError(f"shapes do not broadcast together: {shapes}; add or reorder axes") from None
 
 
-def check_outside(choice: str) -> str:
-    """What to do with points outside the atlas."""
-    if not isinstance(choice, str) or choice not in OUTSIDE_CHOICES:
-        raise ValueError(f"outside must be one of {', '.join(OUTSIDE_CHOICES)}; got {_short(choice)}")
+def check_choice(name: str, choice: Any, choices: tuple[str, ...]) -> str:
+    """One of some words."""
+    if not isinstance(choice, str) or choice not in choices:
+        raise ValueError(f"{name} must be one of {', '.join(choices)}; got {_short(choice)}")
     return choice
+
+
+def check_outside(choice: Any) -> str:
+    """What to do with points outside the atlas."""
+    return check_choice("outside", choice, OUTSIDE_CHOICES)
 
 
 def check_positive_finite(name: str, array: NDArray[np.float64], *, zero: bool = False) -> None:
@@ -75,3 +80,15 @@ def check_one(name: str, value: Any, *, zero: bool = False) -> float:
         raise ValueError(f"{name} must be one number, got an array of shape {array.shape}; call once for each")
     check_positive_finite(name, array, zero=zero)
     return float(array)
+
+
+def check_root(root: Any, nodes: NDArray[np.int64], median: NDArray[np.bool_]) -> int:
+    """Row of an equilibrium named by a word or by its number in rising order of R_x0."""
+    if isinstance(root, str) and root in ("median", "outward"):
+        return int(np.flatnonzero(median if root == "median" else nodes == 0)[0])
+    if isinstance(root, (int, np.integer)) and not isinstance(root, bool) and 0 <= root < len(nodes):
+        return int(root)
+    raise ValueError(
+        f"root must be median, outward or a whole number from 0 to {len(nodes) - 1}, the equilibria in rising order "
+        f"of R_x0; got {_short(root)}"
+    )

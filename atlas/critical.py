@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from atlas.checks import check_broadcast, check_order, check_positive_finite, check_real
 from atlas.limits import unchecked_excess_length
+from atlas.seeds import seed
 from kernels import status
 
 Array = NDArray[np.float64]
@@ -65,22 +66,27 @@ def solve_rows(
     from kernels.sweeps import solve_folds_parallel
 
     rows = len(n)
-    a, gamma = (np.zeros(rows), np.zeros(rows)) if guess is None else (np.abs(guess[0]), guess[1].copy())
+    if guess is None:
+        a, gamma, slopes = seed(n, w_f, lam, excess, solve_rows)
+    else:
+        a, gamma, slopes = np.abs(guess[0]), guess[1].copy(), np.full((rows, 4), np.nan)
     results = np.empty((rows, 4))
     error = np.empty(rows)
     codes = np.empty(rows, np.int64)
     # Copies, because broadcast views are read-only, and numba would compile the kernel anew for those.
     columns = [np.array(column, order="C") for column in (n, w_f, lam, excess)]
     if rows >= PARALLEL_FROM:
-        solve_folds_parallel(*columns, a, gamma, results, error, codes)
+        solve_folds_parallel(*columns, a, gamma, slopes, results, error, codes)
     else:
-        solve_folds(*columns, a, gamma, results, error, codes, 0, rows)
+        solve_folds(*columns, a, gamma, slopes, results, error, codes, 0, rows)
+    with np.errstate(over="ignore"):
+        tension = np.where(codes == status.OK, np.hypot(w_f + lam, results[:, 1]), np.nan)
     return {
         "gamma": results[:, 0],
         "R_x0": results[:, 1],
         "x_f": results[:, 2],
         "z_f": results[:, 3],
-        "tension": np.hypot(w_f + lam, results[:, 1]),
+        "tension": tension,
         "error": error,
         "status": codes.astype(np.int8),
     }

@@ -11,8 +11,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from atlas.nomenclature import REPORT, SYMBOLS
+from atlas.nomenclature import EQUILIBRIUM, REPORT, SYMBOLS, Symbol
 from atlas.seal import BLANK_SEAL, AtlasFileError, written_in_place
+from atlas.table import METHOD
 from kernels.status import FLAG_MEANINGS, SENTENCES
 
 # Beside INTERPOLANT in one group: compliance-checker 6.1 stops with an error at files that have two at the top.
@@ -21,9 +22,9 @@ WITNESS = "support/witness"
 COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True, "fletcher32": True}
 
 
-def symbol_attributes(name: str) -> dict[str, Any]:
+def symbol_attributes(name: str, symbols: dict[str, Symbol] = SYMBOLS) -> dict[str, Any]:
     """CF attributes of a quantity of the nomenclature."""
-    symbol = SYMBOLS[name]
+    symbol = symbols[name]
     attributes: dict[str, Any] = {"long_name": symbol.long_name, "references": symbol.source}
     if name == "status":
         attributes |= {"flag_values": np.array(sorted(SENTENCES), np.int8), "flag_meanings": FLAG_MEANINGS}
@@ -37,6 +38,11 @@ def variable(dims: tuple[str, ...], name: str, data: NDArray[Any], **attributes:
     if name == "n":
         data = np.asarray(data, np.int32)
     return xr.Variable(dims, data, symbol_attributes(name) | attributes)
+
+
+def equilibrium_variable(dims: tuple[str, ...], name: str, data: NDArray[Any], **attributes: Any) -> xr.Variable:
+    """The same for a quantity of any equilibrium."""
+    return xr.Variable(dims, data, symbol_attributes(name, EQUILIBRIUM) | attributes)
 
 
 def plain_table(
@@ -85,6 +91,40 @@ def root_attributes(method: str, extra: dict[str, Any]) -> dict[str, Any]:
         "downwards from it. Between grid points interpolate logarithms in log(lam - lambda_c) and log(w_f).",
         "method": method,
         **extra,
+    }
+
+
+def equilibria_attributes(extra: dict[str, Any]) -> dict[str, Any]:
+    """Global attributes of a table of equilibria."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": "Equilibria of a cable towed in a circle, in a vacuum",
+        "institution": "towatlas",
+        "source": "towatlas, equilibria by the count of zeros of the first variation",
+        "references": f"{REPORT}, On the Shape of a Cable Towed in a Circular Path",
+        "comment": "Of the 2 k + 1 equilibria of a cable, k the number of its critical speeds below gamma, two are "
+        "tabulated: the median one, with k nodes, that the report expects to be seen, and the one without nodes that "
+        "swings outward. They are one until the first critical speed. The median branch jumps at every critical "
+        "speed, where nodes changes: do not interpolate between points of different nodes. All quantities are "
+        "dimensionless: lengths over the tow radius R, forces over (mu + rho A) g R.",
+        "method": METHOD,
+        **extra,
+    }
+
+
+def shape_attributes(facts: dict[str, Any]) -> dict[str, Any]:
+    """Global attributes of the shape of one equilibrium."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": "Shape of a cable towed in a circle, in a vacuum",
+        "institution": "towatlas",
+        "source": "towatlas, shots from the fish up",
+        "references": f"{REPORT}, On the Shape of a Cable Towed in a Circular Path",
+        "comment": "Dimensionless: lengths over the tow radius R, forces over (mu + rho A) g R. At the tow point "
+        "s = 0, x = 1, z = 0; the fish is at s = lam. s_node and z_node are where the cable passes the axis. error "
+        "is the estimated relative error of x_f.",
+        "method": "shape",
+        **facts,
     }
 
 

@@ -246,6 +246,8 @@ def crossing(curve: Curve, log_c: float, before: bool) -> Array | None:
     """First point of a curve with this log C, before or after its cusp; None if it has none."""
     last = cusp_index(curve)
     heights = curve.points[:, 2] - log_c
+    if before and heights[0] >= 0.0:
+        return curve.points[0].copy()
     if last < 0:
         last = len(heights) if before else len(heights) - 1
     span = range(min(last + 1, len(heights) - 1)) if before else range(last, len(heights) - 1)
@@ -361,7 +363,7 @@ def _fold_rows(
                 codes[row] = cusp_code
             elif log_c[row] >= cusps[which[row], 2]:
                 codes[row] = status.NO_PAIR
-            elif (found := crossing(curve, max(log_c[row], np.log(FAINT)), before)) is not None:
+            elif (found := crossing(curve, log_c[row], before)) is not None:
                 guess[row], codes[row] = found, status.OK
             elif not before and cusp_code == status.NO_CUSP:
                 codes[row] = status.NEVER_ENDS if log_c[row] < curve.points[-1, 2] else status.NO_PAIR
@@ -373,7 +375,7 @@ def _fold_rows(
         codes = np.where(tried, solved, codes)
         sides[before] = np.exp(z[:, 1]), np.exp(z[:, 0] - 2.0 * z[:, 1]), error, codes
     appears, r_f, error, codes = (column.copy() for column in sides[True])
-    still: NDArray[np.bool_] = (c == 0.0) & (vacuum["status"][which] == status.OK)
+    still = np.asarray((c == 0.0) & (vacuum["status"][which] == status.OK))
     for column, name in ((appears, "gamma"), (r_f, "x_f"), (error, "error")):
         column[still] = np.abs(vacuum[name][which])[still]
     codes[still] = status.OK

@@ -7,13 +7,17 @@ from numpy.typing import NDArray
 
 from atlas.branches import Members, extrema, shoot_lanes, shoot_singly, solve_members
 from atlas.checks import check_one
+from atlas.critical import solve_rows
 from atlas.drag import DragEquilibria, check_system, solve_drag_equilibria
+from atlas.limits import threshold_offset, unchecked_excess_length
 from kernels import status
 
 # Segments of the forward shot that bears witness to each root.
 WITNESS_SEGMENTS = 10_000
 # With more extrema than this the kernel of many lanes is worth its compilation.
 FEW = 50
+# Half waves on all shots of a kind together beyond which a cable is refused: half a minute.
+HALF_WAVES = 2e7
 
 Array = NDArray[np.float64]
 
@@ -88,7 +92,7 @@ def equilibria(
     ValueError
         For numbers out of range, and what is not one number.
     ArithmeticError
-        If the computation overflows or does not converge.
+        If the computation overflows, does not converge, or would take minutes (HALF_WAVES).
 
     Notes
     -----
@@ -114,12 +118,14 @@ def equilibria(
     if not system.in_vacuum:
         # The vacuum of the report, m_f = w_f and w = 1, is where the equilibria are continued from.
         return solve_drag_equilibria(system, gamma, np.abs(_all_members(w_f, lam, gamma)[1].x_f))
-    return _vacuum_equilibria(lam, w_f, gamma)
+    return vacuum_equilibria(lam, w_f, gamma)
 
 
-def _vacuum_equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
+def vacuum_equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
+    """All equilibria in a vacuum; see `equilibria`."""
     from kernels.scan import forward_shots
 
+    lam, w_f, gamma = check_one("lam", lam), check_one("w_f", w_f, zero=True), check_one("gamma", gamma)
     nodes, found = _all_members(w_f, lam, gamma)
     order = np.argsort(found.R_x0)
     nodes, x_f, z_f, error = nodes[order], found.x_f[order], found.z_f[order], found.error[order]
@@ -143,18 +149,60 @@ def _vacuum_equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
     )
 
 
+def solve_branch(branch: str, w_f: Array, lam: Array, gamma: Array) -> tuple[NDArray[np.int64], Members]:
+    """The outward or the median equilibrium of each row, solved directly; no checks.
+
+    Returns
+    -------
+    nodes : ndarray of int, shape (rows,)
+    members : Members
+    """
+    n = np.zeros(len(lam), np.int64)
+    if branch == "median":
+        n = folds_passed(w_f, lam, gamma)
+    members = solve_members(w_f, lam, gamma, n, np.zeros(len(lam), bool), shoot_lanes)
+    return n, members
+
+
+def folds_passed(w_f: Array, lam: Array, gamma: Array) -> NDArray[np.int64]:
+    """Number of critical speeds below gamma, for each row."""
+    passed = np.zeros(len(lam), np.int64)
+    rows = np.arange(len(lam))
+    while len(rows):
+        n = passed[rows] + 1
+        excess = unchecked_excess_length(lam[rows], w_f[rows], n)
+        states = solve_rows(n, w_f[rows], lam[rows], excess)
+        # One that rounding hides lies next to its threshold, beyond any speed.
+        rows = rows[(states["status"] == status.OK) & (states["gamma"] < gamma[rows])]
+        passed[rows] += 1
+    return passed
+
+
+def _failure(lam: float, w_f: float, gamma: float, code: int) -> ArithmeticError:
+    return ArithmeticError(f"lam = {lam:g}, w_f = {w_f:g}, gamma = {gamma:g}: {status.SENTENCES[code]}")
+
+
+# What overflows becomes a status of the shots.
+@np.errstate(over="ignore", invalid="ignore")
 def _all_members(w_f: float, lam: float, gamma: float) -> tuple[NDArray[np.int64], Members]:
     """Nodes and states of all equilibria of one cable."""
+    # Extrema too low to reach gamma^2 are as many as the half waves of a straight cable, millions at high speeds: of
+    # those beyond the last n with a transition only one is looked for, as a check on the closed form.
+    half_waves = 2.0 / np.pi * gamma * lam / (np.sqrt(w_f + lam) + np.sqrt(w_f))
+    possible = float(np.ceil((lam + 1.0 - threshold_offset(w_f)) / 2.0))
+    if half_waves * (1.0 + 2.0 * min(possible, half_waves)) > HALF_WAVES:
+        raise _failure(lam, w_f, gamma, status.STEP_LIMIT)
     cable = np.array([w_f]), np.array([lam]), np.array([gamma])
     highest, codes = extrema(*cable, shoot_singly)
-    shoot = shoot_singly if highest[0] <= FEW else shoot_lanes
+    last = min(int(highest[0]), int(possible))
+    shoot = shoot_singly if last <= FEW else shoot_lanes
 
     def solve(n: NDArray[np.int64], outer: bool) -> Members:
         w_f, lam, gamma = (np.full(len(n), column[0]) for column in cable)
         return solve_members(w_f, lam, gamma, n, np.full(len(n), outer), shoot)
 
     if codes[0] == status.OK:
-        n = np.arange(highest[0] + 1)
+        n = np.arange(last + 1)
         inner = solve(n, False)
         codes = inner.status
         there = codes == status.OK
@@ -167,8 +215,7 @@ def _all_members(w_f: float, lam: float, gamma: float) -> tuple[NDArray[np.int64
             ]
         )
     if (codes != status.OK).any():
-        sentence = status.SENTENCES[int(codes.max())]
-        raise ArithmeticError(f"lam = {lam:g}, w_f = {w_f:g}, gamma = {gamma:g}: {sentence}")
+        raise _failure(lam, w_f, gamma, int(codes.max()))
     nodes = np.concatenate([n[there], n[there & (n > 0)]])
     columns = {
         name: np.concatenate([getattr(inner, name)[there], getattr(outer, name)]) for name in Members.__annotations__

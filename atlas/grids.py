@@ -35,6 +35,20 @@ class Grid:
 
 
 @dataclass(frozen=True)
+class EquilibriaGrid:
+    """Where the equilibria are tabulated: more than half a million cables and speeds, two equilibria each."""
+
+    w_f: Array = field(default_factory=lambda: np.concatenate([[0.0], _decades(-2, 4, 6)]))
+    lam: Array = field(default_factory=lambda: _decades(-1, 2, 32))
+    gamma: Array = field(default_factory=lambda: 10.0 ** np.linspace(np.log10(0.05), np.log10(20.0), 141))
+
+    @property
+    def size(self) -> int:
+        """Number of cables and speeds."""
+        return len(self.w_f) * len(self.lam) * len(self.gamma)
+
+
+@dataclass(frozen=True)
 class ScanSettings:
     """How finely `scan` looks. Speeds are spaced evenly in their logarithm, from just below 1/sqrt(lambda)."""
 

@@ -7,6 +7,7 @@ gamma grows as (lambda - lambda_cn)^(-1/2) at the threshold and every quantity i
 the states have a term w_f^2 log w_f at zero, which W_SCALE makes small. Needs numpy only.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 # Fish weight at which y turns from linear to logarithmic: smaller, and y spans more; larger, and w_f^2 log w_f shows.
 W_SCALE = 0.03
 FIELDS = ("gamma", "R_x0", "x_f", "z_f")
-# Points evaluated together: their polynomials stay in the second-level cache.
-BLOCK = 4096
+# Patches along each axis, and nodes of a patch along each: measured to agree with the whole series within 1e-13.
+PATCHES = 16
+PATCH_NODES = 20
 
 Array = NDArray[np.float64]
 
@@ -44,15 +46,20 @@ def polynomials(x: Array, count: int) -> Array:
     return values
 
 
+def transform(count: int) -> Array:
+    """Matrix from values on `nodes(count)` to the coefficients of the Chebyshev series through them."""
+    k = np.arange(count)
+    table = np.cos(np.pi * np.outer(k, k[::-1]) / (count - 1)) * (2.0 / (count - 1))
+    table[:, [0, -1]] *= 0.5
+    table[[0, -1], :] *= 0.5
+    return table
+
+
 def coefficients(values: Array) -> Array:
     """Coefficients of the Chebyshev series through values on `nodes`, along both last axes."""
-    # einsum with optimize=False: plain sums, so that the file does not depend on the threads of a BLAS.
     for axis in (-2, -1):
-        count = values.shape[axis]
-        k = np.arange(count)
-        table = np.cos(np.pi * np.outer(k, k[::-1]) / (count - 1)) * (2.0 / (count - 1))
-        table[:, [0, -1]] *= 0.5
-        table[[0, -1], :] *= 0.5
+        table = transform(values.shape[axis])
+        # einsum with optimize=False: plain sums, so that the file does not depend on the threads of a BLAS.
         values = np.einsum("ki,...ij->...kj" if axis == -2 else "kj,...ij->...ik", table, values, optimize=False)
     return values
 
@@ -110,18 +117,42 @@ def from_field(name: str, field: Array, excess: Array, n: NDArray[np.int64]) -> 
     return value
 
 
-def evaluate(series: Array, n: NDArray[np.int64], x: Array, y: Array) -> Array:
-    """Sum of the series n at points (x, y), all of shape (points,); series has shape (n_max, y degree, x degree)."""
-    result = np.empty(len(x))
-    for order in np.unique(n):
-        c = series[order - 1]
-        rows = np.flatnonzero(n == order)
-        for begin in range(0, len(rows), BLOCK):
-            part = rows[begin : begin + BLOCK]
-            along_x = c @ polynomials(x[part], c.shape[1])
-            along_x *= polynomials(y[part], c.shape[0])
-            result[part] = along_x.sum(axis=0)
-    return result
+def _patch_edges() -> Array:
+    return nodes(PATCHES + 1)
+
+
+def patches(series: Array) -> Array:
+    """Short series on PATCHES^2 parts of the unit square that sum to one long series, to 1e-13.
+
+    series : shape (y degree, x degree). Returns shape (PATCHES, PATCHES, PATCH_NODES, PATCH_NODES), y first. A sum of
+    four hundred terms instead of ten thousand: what makes lookup fast.
+    """
+    edges = _patch_edges()
+    at = (0.5 * (edges[1:] + edges[:-1])[:, None] + 0.5 * np.diff(edges)[:, None] * nodes(PATCH_NODES)).ravel()
+    values = polynomials(at, series.shape[0]).T @ (series @ polynomials(at, series.shape[1]))
+    return coefficients(values.reshape(PATCHES, PATCH_NODES, PATCHES, PATCH_NODES).swapaxes(1, 2))
+
+
+def evaluate(tables: Sequence[Mapping[int, Array]], n: NDArray[np.int64], x: Array, y: Array) -> list[Array]:
+    """Values at points (x, y), all of shape (points,), of several tables; tables[k][n] are the `patches` of one n."""
+    edges = _patch_edges()
+    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+    column, row = (np.searchsorted(edges[1:-1], c, side="right") for c in (x, y))
+    # Points of one patch together: then each patch is one small matrix product.
+    patch = ((n * PATCHES + row) * PATCHES + column).astype(np.uint16 if n.max() < 400 else np.int64)
+    order = np.argsort(patch, kind="stable")
+    patch, column, row = patch[order], column[order], row[order]
+    along_x = polynomials((x[order] - middle[column]) / half[column], PATCH_NODES)
+    along_y = polynomials((y[order] - middle[row]) / half[row], PATCH_NODES)
+    starts = np.flatnonzero(np.concatenate([[True], patch[1:] != patch[:-1]]))
+    results = [np.empty(len(x)) for _ in tables]
+    for begin, stop in zip(starts, [*starts[1:], len(x)], strict=True):
+        which = int(patch[begin]) // PATCHES**2, row[begin], column[begin]
+        for table, result in zip(tables, results, strict=True):
+            terms = table[which[0]][which[1:]] @ along_x[:, begin:stop]
+            terms *= along_y[:, begin:stop]
+            result[order[begin:stop]] = terms.sum(axis=0)
+    return results
 
 
 def tensor(series: Array, x: Array, y: Array) -> Array:

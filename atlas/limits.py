@@ -1,5 +1,7 @@
 """Closed forms of the vacuum problem: thresholds and limits. Lengths over the tow radius, forces over (mu+rho A)gR."""
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -77,6 +79,17 @@ def excess_length(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Array:
     check_positive_finite("w_f", w_f, zero=True)
     lam, w_f, n = check_broadcast(lam=lam, w_f=w_f, n=check_order(n))
     return unchecked_excess_length(lam, w_f, n)
+
+
+def transitions(lam: float, w_f: float) -> int:
+    """Number of transitions that a cable has, the n with lambda > lambda_cn(w_f); no checks.
+
+    Examples
+    --------
+    >>> transitions(37.8, 1352.0)
+    19
+    """
+    return max(0, math.ceil(0.5 * (lam + 1.0 - float(threshold_offset(w_f)))) - 1)
 
 
 def massless_cable(lam: ArrayLike) -> Array:

@@ -3,7 +3,8 @@
 import os
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,8 @@ INTERPOLANT = "support/interpolant"  # the group of the series
 EPS = np.finfo(float).eps
 ROUNDINGS = 48.0  # as in kernels.extract, whose import would bring numba (test_error_constants_agree)
 
+QUANTITIES = ("gamma", "R_x0", "x_f", "z_f", "tension", "error", "status")
+
 Array = NDArray[np.float64]
 
 _NETCDF = threading.Lock()
@@ -43,10 +46,17 @@ def _dataset(path: Path, data: bytes) -> netCDF4.Dataset:
     return file
 
 
+@contextmanager
+def open_group(path: Path, data: bytes) -> Iterator[netCDF4.Dataset]:
+    """The file whose bytes these are, for reading at once: the NetCDF library is not safe to call from two threads."""
+    with _NETCDF, _dataset(path, data) as file:
+        yield file
+
+
 def read_root(path: Path) -> tuple[dict[str, Any], bytes, str]:
     """Global attributes, bytes and seal of any towatlas file, an atlas or a plain table; errors as `open_atlas`."""
     data, seal = read_sealed(path)
-    with _NETCDF, _dataset(path, data) as file:
+    with open_group(path, data) as file:
         attributes = {name: file.getncattr(name) for name in file.ncattrs()}
     version = attributes.get("schema_version")
     if version is None:
@@ -108,8 +118,7 @@ class Atlas:
                 f"{path} was built with --method {self.attributes.get('method')} and holds a plain table only; "
                 "lookup needs an atlas built with --method fold"
             )
-        # Everything is read now, under the lock: the NetCDF library is not safe to call from several threads.
-        with _NETCDF, _dataset(path, data) as file:
+        with open_group(path, data) as file:
             group = file[INTERPOLANT]
             self.axes = interpolant.Axes(
                 excess_min=float(group.excess_min), excess_max=float(group.excess_max), w_f_max=float(group.w_f_max)
@@ -119,13 +128,14 @@ class Atlas:
             }
             self._error_map: Array = np.asarray(group["gamma_error"][:], np.float64)
         self.n_max = len(self._error_map)
+        self._patches: dict[str, dict[int, Array]] = {name: {} for name in interpolant.FIELDS}
 
     def states(self, lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1, outside: str = "raise") -> CriticalStates:
         """All quantities of the critical states, with error estimate and status; see the class for the parameters."""
         check_outside(outside)
         lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
         flat = n.ravel(), w_f.ravel(), lam.ravel()
-        table = self._answer(*flat, outside)
+        table = self._answer(*flat, outside, QUANTITIES)
         return CriticalStates(
             n=n, lam=lam, w_f=w_f, **{name: column.reshape(n.shape) for name, column in table.items()}
         )
@@ -160,11 +170,16 @@ class Atlas:
 
     def _quantity(self, name: str, lam: Any, w_f: Any, n: Any, outside: str) -> Any:
         def plain(lam: Any, w_f: Any, n: Any) -> Any:
-            return getattr(self.states(lam, w_f, n, outside), name)[()]
+            check_outside(outside)
+            lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
+            return self._answer(n.ravel(), w_f.ravel(), lam.ravel(), outside, (name,))[name].reshape(n.shape)[()]
 
         return _with_xarray(plain, name, lam, w_f, n)
 
-    def _answer(self, n: NDArray[np.int64], w_f: Array, lam: Array, outside: str) -> dict[str, NDArray[Any]]:
+    def _answer(
+        self, n: NDArray[np.int64], w_f: Array, lam: Array, outside: str, names: tuple[str, ...]
+    ) -> dict[str, NDArray[Any]]:
+        """The quantities named, with status, of checked rows."""
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             excess = unchecked_excess_length(lam, w_f, n)
             sound = np.isfinite(lam) & np.isfinite(w_f) & (lam > 0.0) & (w_f >= 0.0)
@@ -178,16 +193,14 @@ class Atlas:
         unanswered = ~(inside | absent)
         if outside == "raise" and unanswered.any():
             raise ValueError(self._complaint(n, w_f, lam, unanswered))
-        table: dict[str, NDArray[Any]] = {
-            name: np.full(len(n), np.nan) for name in ("gamma", "R_x0", "x_f", "z_f", "tension", "error")
-        }
+        table: dict[str, NDArray[Any]] = {name: np.full(len(n), np.nan) for name in names if name != "status"}
         self._interpolate(table, inside, n, w_f, lam, excess)
         table["status"] = codes
         again = unanswered & sound
         if outside == "solve" and again.any():
             solved = solve_rows(n[again], w_f[again], lam[again], excess[again])
-            for name, column in solved.items():
-                table[name][again] = column
+            for name in table:
+                table[name][again] = solved[name]
         return table
 
     def _interpolate(
@@ -203,16 +216,30 @@ class Atlas:
         if not len(n):
             return
         x, y = self.axes.x(excess), self.axes.y(w_f)
-        for name in interpolant.FIELDS:
-            field = interpolant.evaluate(self._series[name], n, x, y)
-            table[name][inside] = interpolant.from_field(name, field, excess, n)
-        table["tension"][inside] = np.hypot(w_f + lam, table["R_x0"][inside])
-        blocks = self._error_map.shape[1:]
-        at = [
-            np.minimum((0.5 * (c + 1.0) * count).astype(int), count - 1)
-            for c, count in zip((y, x), blocks, strict=True)
-        ]
-        table["error"][inside] = self._error_map[n - 1, at[0], at[1]] + ROUNDINGS * EPS * (1.0 + lam / excess)
+        fields = [name for name in interpolant.FIELDS if name in table or (name == "R_x0" and "tension" in table)]
+        sums = interpolant.evaluate([self._patches_of(name, n) for name in fields], n, x, y) if fields else []
+        values = {
+            name: interpolant.from_field(name, field, excess, n) for name, field in zip(fields, sums, strict=True)
+        }
+        if "tension" in table:
+            values["tension"] = np.hypot(w_f + lam, values["R_x0"])
+        if "error" in table:
+            blocks = self._error_map.shape[1:]
+            at = [
+                np.minimum((0.5 * (c + 1.0) * count).astype(int), count - 1)
+                for c, count in zip((y, x), blocks, strict=True)
+            ]
+            values["error"] = self._error_map[n - 1, at[0], at[1]] + ROUNDINGS * EPS * (1.0 + lam / excess)
+        for name in table.keys() & values.keys():
+            table[name][inside] = values[name]
+
+    def _patches_of(self, name: str, n: NDArray[np.int64]) -> dict[int, Array]:
+        """Patches of a field, made for each n when first asked for; two threads at once make the same."""
+        made = self._patches[name]
+        for order in range(int(n.min()), int(n.max()) + 1):
+            if order not in made:
+                made[order] = interpolant.patches(self._series[name][order - 1])
+        return made
 
     def _complaint(self, n: NDArray[np.int64], w_f: Array, lam: Array, bad: NDArray[np.bool_]) -> str:
         """What is wrong with the first unanswered point, and how many there are."""

@@ -1,6 +1,6 @@
 """The one table of symbols: what every quantity is called in files, axes and help, and where it is defined."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 REPORT = "NRL Report 7048 (Skop 1970)"
 
@@ -19,6 +19,8 @@ class Symbol:
         """Label for a plot axis: the words up to the formula, then the symbol."""
         return f"{self.long_name.split(', ')[0]}  {self.tex}"
 
+
+_AT_FOLD = ", at the critical speed"
 
 _TABLE = (
     Symbol("n", "number of the transition", "$n$", REPORT),
@@ -46,19 +48,19 @@ _TABLE = (
     ),
     Symbol(
         "x_f",
-        "radial position of the fish over tow radius, positive on the side of the tow point, at the critical speed",
+        "radial position of the fish over tow radius, positive on the side of the tow point" + _AT_FOLD,
         "$x_f$",
         f"{REPORT}, Eq. (32)",
     ),
     Symbol(
         "z_f",
-        "depth of the fish below the tow point over tow radius, at the critical speed",
+        "depth of the fish below the tow point over tow radius" + _AT_FOLD,
         "$z_f$",
         f"{REPORT}, Eq. (31)",
     ),
     Symbol(
         "tension",
-        "cable tension T_0 at the tow point over (mu + rho A) g R, at the critical speed",
+        "cable tension T_0 at the tow point over (mu + rho A) g R" + _AT_FOLD,
         "$T_0$",
         f"{REPORT}, Eqs. (20d), (28)",
     ),
@@ -67,3 +69,34 @@ _TABLE = (
 )
 
 SYMBOLS = {symbol.name: symbol for symbol in _TABLE}
+
+_ONE_STATE = (
+    Symbol("gamma", "speed, gamma = Omega sqrt(R/g)", r"$\gamma = \Omega\sqrt{R/g}$", f"{REPORT}, Eq. (13b)"),
+    Symbol("nodes", "number of nodes, points of the cable on the axis", "", REPORT),
+    Symbol("count", "number of equilibria", "", REPORT),
+    Symbol("error", "estimated relative error of x_f", r"$\epsilon$", "towatlas"),
+    Symbol("s", "arc length from the tow point over tow radius", "$s$", f"{REPORT}, nondimensional S"),
+    Symbol(
+        "x",
+        "radial position over tow radius, positive on the side of the tow point",
+        "$x$",
+        f"{REPORT}, Eq. (32a)",
+    ),
+    Symbol("z", "depth below the tow point over tow radius", "$z$", f"{REPORT}, Eq. (31)"),
+    Symbol("R_x", "radial force of the cable over (mu + rho A) g R", "$R_x$", f"{REPORT}, Eq. (32b)"),
+    Symbol("R_z", "vertical force of the cable over (mu + rho A) g R", "$R_z$", f"{REPORT}, Eq. (28)"),
+    Symbol("T", "cable tension over (mu + rho A) g R", "$T$", f"{REPORT}, Eq. (20d)"),
+)
+
+# The same quantities of any equilibrium, not of a critical state.
+EQUILIBRIUM = {
+    name: replace(symbol, long_name=symbol.long_name.removesuffix(_AT_FOLD)) for name, symbol in SYMBOLS.items()
+} | {symbol.name: symbol for symbol in _ONE_STATE}
+
+_FOLDS_WITH_DRAG = (
+    Symbol("C", "drag constant of the cable, (1/2) rho C_D d R / (mu + rho A)", "$C$", f"{REPORT}, Eq. (13c)"),
+    Symbol("C_cusp", "drag constant above which the n-th pair of equilibria never appears", "$C^*_n$", "towatlas"),
+    Symbol("appears", "speed at which the n-th pair of equilibria appears", r"$\gamma_{cn}(C)$", "towatlas"),
+    Symbol("ends", "speed at which the outer member of the n-th pair is gone", r"$\gamma_{en}(C)$", "towatlas"),
+)
+DRAG = SYMBOLS | {symbol.name: symbol for symbol in _FOLDS_WITH_DRAG}

@@ -1,15 +1,19 @@
 """Figures. Each function draws on the axes given, or on new ones, and returns the artists that carry data."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
 from atlas.limits import long_cable, massless_cable, unchecked_excess_length, unchecked_threshold_length
 from atlas.lookup import Atlas
-from atlas.nomenclature import SYMBOLS
+from atlas.nomenclature import EQUILIBRIUM, SYMBOLS
+
+if TYPE_CHECKING:
+    import xarray
 
 # Dark to light, so that they differ in grey too, and told apart by dashes besides (Okabe and Ito's safe colours).
 STYLES: tuple[dict[str, Any], ...] = (
@@ -18,6 +22,8 @@ STYLES: tuple[dict[str, Any], ...] = (
     {"color": "#D55E00", "linestyle": (0, (4, 1.5, 1, 1.5))},
     {"color": "#E69F00", "linestyle": (0, (1.5, 1.5))},
 )
+# Least width of the drawing of a slender cable, as a share of its height.
+SLENDER = 0.3
 LIMIT: dict[str, Any] = {"color": "0.55", "linewidth": 0.9, "zorder": 1}
 
 
@@ -103,3 +109,58 @@ def _label_orders(ax: Axes, atlas: Atlas, orders: tuple[int, ...], w_f: tuple[fl
                     f"$n = {n}$", (1000.0, gamma), (4, 0), textcoords="offset points", va="center", color=style["color"]
                 )
                 named.append(gamma)
+
+
+def plot_shape(curve: "xarray.Dataset", ax: Axes | None = None) -> LineCollection:
+    """The shape of one equilibrium in true proportions, coloured by its tension, with its nodes marked.
+
+    Parameters
+    ----------
+    curve : xarray.Dataset
+        From `atlas.shape`.
+    ax : Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    LineCollection
+        The cable.
+    """
+    if ax is None:
+        _, ax = plt.subplots(figsize=(5.2, 6.4), layout="compressed")
+    x, z, tension = curve.x.values, curve.z.values, curve["T"].values
+    points = np.stack([x, z], axis=1)
+    cable = LineCollection(
+        list(np.stack([points[:-1], points[1:]], axis=1)),
+        array=0.5 * (tension[1:] + tension[:-1]),
+        cmap="viridis_r",
+        linewidth=2.2,
+        capstyle="round",
+    )
+    ax.axvline(0.0, **LIMIT, linestyle=(0, (8, 3, 2, 3)))
+    ax.add_collection(cable)
+    ax.plot(x[0], z[0], marker="v", color="k", markersize=8, linestyle="none", label="tow point", zorder=4)
+    fish = "fish" if curve.attrs["w_f"] > 0 else "end of the cable"
+    ax.plot(x[-1], z[-1], marker="o", color="k", markersize=7, linestyle="none", label=fish, zorder=4)
+    if curve.attrs["nodes"]:
+        nodes = curve.z_node.values
+        style: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": "k", "markersize": 6, "linestyle": "none"}
+        # Above the fish, which hides a node next to it.
+        ax.plot(0.0 * nodes, nodes, label="node", zorder=5, **style)
+    low, high = min(0.0, x.min()), max(0.0, x.max())
+    width = 1.12 * max(high - low, SLENDER * (z.max() - z.min()))
+    middle = 0.5 * (low + high)
+    ax.set(xlim=(middle - 0.5 * width, middle + 0.5 * width), ylim=(z.max() + 0.04 * width, z.min() - 0.04 * width))
+    ax.set_aspect("equal")
+    ax.margins(0.05)
+    ax.set_xlabel(f"radius  {EQUILIBRIUM['x'].tex}  (tow radii)")
+    ax.set_ylabel(f"depth  {EQUILIBRIUM['z'].tex}  (tow radii)")
+    ax.set_title(
+        f"{EQUILIBRIUM['lam'].tex} = {curve.attrs['lam']:g},  {EQUILIBRIUM['w_f'].tex} = {curve.attrs['w_f']:g},  "
+        rf"$\gamma$ = {curve.attrs['gamma']:g}",
+        fontsize=10,
+    )
+    bar = ax.figure.colorbar(cable, ax=ax, shrink=0.7)
+    bar.set_label(r"tension  $T$ over $(\mu + \rho A) g R$")
+    ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=3, frameon=False, fontsize=9)
+    return cable

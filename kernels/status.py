@@ -11,9 +11,10 @@ OUTSIDE = 4
 NOT_FOUND = 5
 BAD_INPUT = 6
 LOST_IN_ROUNDING = 7
-NO_PAIR = 8
-NEVER_ENDS = 9
-NO_CUSP = 10
+NEAR_FOLD = 8
+NO_PAIR = 9
+NEVER_ENDS = 10
+NO_CUSP = 11
 
 SENTENCES = {
     OK: "computed",
@@ -22,8 +23,9 @@ SENTENCES = {
     NOT_CONVERGED: "the direct solver did not converge; please report the inputs",
     OUTSIDE: "outside the range of the atlas; ask for the direct solver",
     NOT_FOUND: "the scan found no such transition up to its highest speed",
-    BAD_INPUT: "an input is not finite, not positive (lambda), negative (w_f), or so large that arithmetic overflows",
+    BAD_INPUT: "an input is not finite, not positive (lambda), negative (w_f), or so large or small that it overflows",
     LOST_IN_ROUNDING: "lambda is so close to lambda_cn that rounding leaves fewer than four digits of the answer",
+    NEAR_FOLD: "too close to a fold to interpolate; ask for the direct solver",
     NO_PAIR: "too much drag: the pair never appears",
     NEVER_ENDS: "the pair does not end up to the highest speed looked at",
     NO_CUSP: "no cusp: as the drag rises, the pair appears at ever higher speed, up to the highest looked at",
@@ -32,5 +34,5 @@ SENTENCES = {
 # Names for CF flag_meanings: one word each, in the order of the codes.
 FLAG_MEANINGS = (
     "computed no_transition step_limit not_converged outside_atlas not_found_by_scan bad_input lost_in_rounding "
-    "no_pair never_ends no_cusp"
+    "near_fold no_pair never_ends no_cusp"
 )

@@ -29,7 +29,8 @@ def rk4_forward(x, force, below, gamma2, ds):
     x2, f2 = forward_slopes(x + 0.5 * ds * x1, force + 0.5 * ds * f1, middle, gamma2)
     x3, f3 = forward_slopes(x + 0.5 * ds * x2, force + 0.5 * ds * f2, middle, gamma2)
     x4, f4 = forward_slopes(x + ds * x3, force + ds * f3, below - ds, gamma2)
-    sixth = ds / 6.0
+    # Times, not over: the division unit is what these shots wait for.
+    sixth = ds * (1.0 / 6.0)
     return (
         x + sixth * (x1 + 2.0 * (x2 + x3) + x4),
         force + sixth * (f1 + 2.0 * (f2 + f3) + f4),

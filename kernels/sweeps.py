@@ -28,12 +28,12 @@ def _march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts
         march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts, statuses, begin, stop)
 
 
-def _solve_folds(n, w_f, lam, excess, a, gamma, results, error, statuses):
+def _solve_folds(n, w_f, lam, excess, a, gamma, slopes, results, error, statuses):
     rows = len(n)
     for block in numba.prange((rows + FOLDS_BLOCK - 1) // FOLDS_BLOCK):
         begin = block * FOLDS_BLOCK
         stop = min(rows, begin + FOLDS_BLOCK)
-        solve_folds(n, w_f, lam, excess, a, gamma, results, error, statuses, begin, stop)
+        solve_folds(n, w_f, lam, excess, a, gamma, slopes, results, error, statuses, begin, stop)
 
 
 def _forward_shots(w_f, lam, gamma, r_x0, segments, errors, x_end, r_x_end):

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -29,3 +30,24 @@ def atlas_file(atlas_path):
     from atlas import open_atlas
 
     return open_atlas(atlas_path)
+
+
+@pytest.fixture(scope="session")
+def equilibria_grid():
+    """The default spacing on a part of its range, which holds cables of up to four folds."""
+    from atlas.grids import EquilibriaGrid
+
+    return EquilibriaGrid(
+        w_f=np.concatenate([[0.0], 10.0 ** np.linspace(-2, 2, 17)]),
+        lam=10.0 ** np.linspace(0, 1, 25),
+        gamma=10.0 ** np.linspace(-1, 0.5, 51),
+    )
+
+
+@pytest.fixture(scope="session")
+def equilibria_path(tmp_path_factory, equilibria_grid):
+    from atlas.build_equilibria import build_equilibria
+
+    path = tmp_path_factory.mktemp("equilibria") / "equilibria.nc"
+    build_equilibria(path, grid=equilibria_grid, progress=False)
+    return path

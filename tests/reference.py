@@ -129,8 +129,8 @@ def shot(a, mu, tau):
         return state
 
 
-def fold_error(n, w_f, lam, a, gamma):
-    """Relative errors (of a, of gamma) of a critical state found in double precision: one Newton step in 34 digits."""
+def fold_step(n, w_f, lam, a, gamma):
+    """Steps in (log a, log gamma), mpmath numbers, from a critical state in double precision: one of Newton's."""
     with mp.workdps(DIGITS):
         sign = 1 if n % 2 == 0 else -1
         x = [mp.log(mp.mpf(a)), mp.log(mp.mpf(gamma))]
@@ -145,5 +145,10 @@ def fold_error(n, w_f, lam, a, gamma):
         along_a = (residual(x[0] + h, x[1]) - here) / h
         along_gamma = (residual(x[0], x[1] + h) - here) / h
         jacobian = mp.matrix([[along_a[0], along_gamma[0]], [along_a[1], along_gamma[1]]])
-        step = mp.lu_solve(jacobian, -here)
-        return float(abs(step[0])), float(abs(step[1]))
+        return mp.lu_solve(jacobian, -here)
+
+
+def fold_error(n, w_f, lam, a, gamma):
+    """Relative errors (of a, of gamma) of a critical state found in double precision."""
+    step = fold_step(n, w_f, lam, a, gamma)
+    return float(abs(step[0])), float(abs(step[1]))

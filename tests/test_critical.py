@@ -35,7 +35,7 @@ def test_error_against_mpmath():
     """The error estimate holds against one Newton step in 34 digits, over the domain and at its edges."""
     cables = [
         (1, 0.0, 2.001), (6, 0.0, 12.001), (3, 1e4, 5.2), (1, 1e4, 1000.0), (6, 1e-4, 30.0), (2, 1352.0, 37.8),
-        (4, 5.0, 9.0), (6, 3000.0, 25.0), (9, 0.3, 40.0),
+        (4, 5.0, 9.0), (6, 3000.0, 25.0), (9, 0.3, 40.0), (3, 0.0, 1e5), (1, 10.0, 1e5),
     ]  # fmt: skip
     for n, w_f, lam in cables:
         state = atlas.solve_critical(lam, w_f, n)
@@ -52,8 +52,11 @@ def test_guess_converges_everywhere():
         n, w_f, lam = random_cables(rows, seed, n_max)
         states = atlas.solve_critical(lam, w_f, n)
         assert set(states.status) == {status.OK}
-        rounding = np.finfo(float).eps * (1 + lam / excess_length(lam, w_f, n))
-        assert (states.error <= (64 if n_max <= 6 else 400) * rounding).all()
+        # That of lambda, and of the wave, whose amplitude may outgrow p.
+        gamma2 = states.gamma**2
+        amplitude = np.hypot(1.0, states.R_x0 / np.sqrt(np.hypot(w_f + lam, states.R_x0) * gamma2))
+        rounding = (64 if n_max <= 6 else 400) * (1 + lam / excess_length(lam, w_f, n)) + 8 * amplitude
+        assert (states.error <= np.finfo(float).eps * rounding).all()
 
 
 def test_guess_does_not_matter():

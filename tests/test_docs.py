@@ -12,18 +12,20 @@ import pytest
 ROOT = Path(__file__).parent.parent
 
 
-@pytest.mark.parametrize("module", ["atlas.critical", "atlas.equilibria", "atlas.limits"])
+@pytest.mark.parametrize("module", ["atlas.critical", "atlas.equilibria", "atlas.limits", "atlas.shape"])
 def test_examples_in_docstrings(module):
     result = doctest.testmod(importlib.import_module(module), raise_on_error=False)
     assert result.attempted > 0
     assert result.failed == 0
 
 
-def test_python_of_the_readme_runs(atlas_path, tmp_path):
-    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
-    assert len(blocks) == 2
+@pytest.mark.parametrize("page", ["README.md", "docs/equilibria.md"])
+def test_python_of_a_page_runs(page, atlas_path, equilibria_path, tmp_path):
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.S)
+    assert len(blocks) >= 2
     (tmp_path / "build").mkdir()
     (tmp_path / "build" / "atlas.nc").symlink_to(atlas_path)
+    (tmp_path / "build" / "equilibria.nc").symlink_to(equilibria_path)
     for block in blocks:
         done = subprocess.run([sys.executable, "-c", block], cwd=tmp_path, capture_output=True, text=True)
         assert (done.returncode, done.stderr) == (0, "")

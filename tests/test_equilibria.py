@@ -198,7 +198,19 @@ def test_bad_input(system, match):
 
 def test_overflow_is_said():
     with pytest.raises(ArithmeticError, match="overflows"):
-        atlas.equilibria(1e80, 1.0, 1e60)
+        atlas.equilibria(1.0, 1e300, 1e10)
+
+
+@pytest.mark.parametrize("system", [(1e80, 1.0, 1e60), (3.0, 0.0, 1e8), (1e5, 0.0, 1e3)])
+def test_what_would_take_minutes_is_refused(system):
+    with pytest.raises(ArithmeticError, match="too many nodes"):
+        atlas.equilibria(*system)
+
+
+def test_fast_cable_with_few_equilibria():
+    """11 000 extrema of p, two of them with equilibria: only what can exist is looked for."""
+    e = atlas.equilibria(3.0, 0.0, 1e4)
+    assert list(e.nodes) == [1, 1, 0]
 
 
 def test_shell(capsys):

@@ -20,11 +20,18 @@ def test_series_through_the_nodes():
 
 
 def test_evaluate_is_numpys_chebyshev_sum():
+    """Patches of a series that falls as those of an atlas do, against the sum of the whole series; ends included."""
     rng = np.random.default_rng(1)
-    series = rng.normal(size=(3, 5, 8))
+    decay = 10.0 ** (-np.add.outer(np.arange(96) / 96, np.arange(112) / 112) * 20)
+    series = rng.normal(size=(3, 96, 112)) * decay
     n, x, y = rng.integers(1, 4, 10000), rng.uniform(-1, 1, 10000), rng.uniform(-1, 1, 10000)
+    x[:4], y[:4] = [-1, -1, 1, 1], [-1, 1, -1, 1]
+    x[4 : 5 + interpolant.PATCHES] = interpolant.nodes(interpolant.PATCHES + 1)
     expected = np.array([chebyshev.chebval2d(*at, series[k - 1]) for k, *at in zip(n, y, x, strict=True)])
-    np.testing.assert_allclose(interpolant.evaluate(series, n, x, y), expected, atol=1e-12)
+    table = {k: interpolant.patches(series[k - 1]) for k in (1, 2, 3)}
+    twice = interpolant.evaluate([table, table], n, x, y)
+    np.testing.assert_array_equal(twice[0], twice[1])
+    np.testing.assert_allclose(twice[0], expected, atol=1e-11)
 
 
 def test_midpoints_lie_between_nodes():

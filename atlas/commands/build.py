@@ -5,20 +5,36 @@ from pathlib import Path
 from typing import Any
 
 from atlas.commands.common import OK, threads
+from atlas.drag_table import default_drag_path
 from atlas.lookup import default_path
+from atlas.table import DEFAULT_PATH
 
 
 def add(commands: Any) -> None:
     """Declare the command."""
     parser = commands.add_parser("build", help="build an atlas file", description="Build an atlas file.")
     parser.add_argument(
-        "--out", type=Path, metavar="FILE", help=f"default {default_path()}, or build/scan.nc for --method scan"
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help=f"default {default_path()}, {DEFAULT_PATH} for --equilibria, {default_drag_path()} for --drag, "
+        "build/scan.nc for --method scan",
+    )
+    parser.add_argument(
+        "--equilibria",
+        action="store_true",
+        help="a table of equilibria over (w_f, lambda, gamma) instead: where the fish is, beside the jumps",
+    )
+    parser.add_argument(
+        "--drag",
+        action="store_true",
+        help="a table of folds with drag instead: where pairs of equilibria appear and end; takes some minutes",
     )
     parser.add_argument(
         "--method",
         choices=("fold", "scan"),
-        default="fold",
-        help="fold: direct solution, with a scan beside it as a witness; scan: the report's own method, a plain table",
+        help="fold (the default): direct solution, with a scan beside it as a witness; scan: the report's own method, "
+        "a plain table",
     )
     parser.add_argument("--threads", type=threads, metavar="N", help="default: all; the file does not depend on it")
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
@@ -26,8 +42,23 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    how = {"threads": options.threads, "progress": not options.quiet}
+    if options.equilibria:
+        if options.method:
+            raise ValueError("--method says how critical speeds are found; a table of --equilibria has one method")
+        from atlas.build_equilibria import build_equilibria
+
+        print(build_equilibria(options.out or DEFAULT_PATH, **how))
+        return OK
+    if options.drag:
+        if options.method:
+            raise ValueError("--method says how critical speeds are found; a table with --drag has one method")
+        from atlas.build_drag import build_drag
+
+        print(build_drag(options.out or default_drag_path(), **how))
+        return OK
     from atlas.build import build_atlas
 
-    out = options.out or (default_path() if options.method == "fold" else Path("build/scan.nc"))
-    print(build_atlas(out, options.method, threads=options.threads, progress=not options.quiet))
+    method = options.method or "fold"
+    print(build_atlas(options.out or (default_path() if method == "fold" else Path("build/scan.nc")), method, **how))
     return OK

@@ -2,8 +2,10 @@
 
 import argparse
 import math
+import os
 import sys
 from pathlib import Path
+from typing import Any
 
 from atlas.lookup import default_path
 
@@ -72,6 +74,24 @@ def add_atlas(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="default %(default)s; $TOWATLAS_FILE sets another",
     )
+
+
+FIGURE_FORMATS = (".svg", ".png", ".pdf")
+
+
+def new_figure(width: float, height: float, layout: str = "constrained") -> Any:
+    """A figure and its axes, drawn without a screen, the same bytes every time."""
+    os.environ["MPLBACKEND"] = "Agg"
+    import matplotlib.pyplot as plt
+
+    plt.rcParams["svg.hashsalt"] = "towatlas"
+    return plt.subplots(figsize=(width, height), layout=layout)
+
+
+def save_figure(figure: Any, path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=200, metadata={"Date": None} if path.suffix.lower() == ".svg" else {})
+    say(f"wrote {path}")
 
 
 def say(message: str) -> None:

@@ -20,7 +20,7 @@ from atlas.commands.common import (
     weight,
 )
 from atlas.critical import CriticalStates, solve_critical
-from atlas.limits import threshold_offset, unchecked_threshold_length
+from atlas.limits import transitions, unchecked_threshold_length
 from atlas.lookup import Atlas, open_atlas
 from atlas.nomenclature import REPORT, SYMBOLS
 from kernels import status
@@ -48,14 +48,9 @@ def add(commands: Any) -> None:
     parser.set_defaults(run=_run)
 
 
-def _existing(lam: float, w_f: float) -> int:
-    """Number of transitions a cable has."""
-    return max(0, math.ceil(0.5 * (lam + 1.0 - float(threshold_offset(w_f)))) - 1)
-
-
 def _run(options: argparse.Namespace) -> int:
     lam, w_f = options.lam, options.wf
-    existing = _existing(lam, w_f)
+    existing = transitions(lam, w_f)
     atlas = None if options.solve else open_atlas(options.atlas)
     limit = MOST_SOLVED if atlas is None else atlas.n_max
     orders = np.arange(1, min(existing, limit) + 1) if options.n is None else np.array([options.n])

@@ -6,6 +6,7 @@ from typing import Any
 
 from atlas.commands.common import OK
 from atlas.lookup import default_path, open_atlas, read_root
+from atlas.table import METHOD, open_equilibria
 
 
 def add(commands: Any) -> None:
@@ -28,6 +29,9 @@ def _run(options: argparse.Namespace) -> int:
         print(f"{'n':<40}  1 .. {atlas.n_max}")
         print(f"{'w_f':<40}  0 .. {axes.w_f_max:g}")
         print(f"{'lam - lambda_c':<40}  {axes.excess_min:g} .. {axes.excess_max:g}")
+    elif attributes.get("method") == METHOD:
+        for name, nodes in open_equilibria(options.file).grid.items():
+            print(f"{name:<40}  {nodes[0]:g} .. {nodes[-1]:g}")
     for name in sorted(attributes):
         value = attributes[name]
         print(f"{name:<40}  {format(value, '.2g') if isinstance(value, float) else value}")

@@ -1,0 +1,145 @@
+"""`towatlas design`: the cable that puts the fish at a depth."""
+
+import argparse
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from atlas.answers import Design, design
+from atlas.commands.common import NO_STATE, OK, add_atlas, announce_compilation, say
+from atlas.commands.scene import add_speed, atlas_if_any, describe_speed, quantity, scene_of
+from atlas.equilibria import equilibria
+
+
+def add(commands: Any) -> None:
+    """Declare the command."""
+    parser = commands.add_parser(
+        "design",
+        help="cable lengths that put the fish of a scene at a depth",
+        description="All cable lengths that put the fish at a depth below the plane of the towing circle, by the "
+        "vacuum model, with the distance to the nearest critical speed. The length in the scene is not used.",
+    )
+    parser.add_argument("--scene", required=True, metavar="FILE", help="a scene, or the name of one that is shipped")
+    parser.add_argument("--depth", type=quantity("m"), required=True, metavar="D", help="as 120m; bare: m")
+    parser.add_argument(
+        "--max-radius", type=quantity("m"), default=math.inf, metavar="R", help="farthest from the axis; default: any"
+    )
+    parser.add_argument(
+        "--max-length",
+        type=quantity("m"),
+        metavar="L",
+        help="longest cable searched; default 10 times the distance from the tow point to the axis at that depth",
+    )
+    add_speed(parser)
+    add_atlas(parser)
+    parser.add_argument("--json", action="store_true", help="one object instead of a table")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    scene = scene_of(options.scene, options)
+    atlas = atlas_if_any(options.atlas)
+    announce_compilation("shoot_each", 5)
+    found = design(
+        scene,
+        options.depth,
+        options.max_radius,
+        options.max_length,
+        atlas,
+        lambda: announce_compilation("solve_folds"),
+    )
+    rows = _rows(found)
+    reason = None if rows else _reason(found)
+    if options.json:
+        answer = {
+            "file": scene.source,
+            "model": "vacuum",
+            "gamma": scene.gamma,
+            "depth_m": found.depth,
+            "max_radius_m": found.max_radius if math.isfinite(found.max_radius) else None,
+            "longest_searched_m": found.longest,
+            "cables": rows,
+            "reason": reason,
+        }
+        print(json.dumps(answer, indent=1))
+    elif rows:
+        print(_text(found, rows))
+    if reason:
+        say(reason)
+        return NO_STATE
+    return OK
+
+
+def _rows(found: Design) -> list[dict[str, Any]]:
+    scene, cables = found.scene, found.cables
+    force = scene.force_unit()
+    rows = []
+    for k in np.flatnonzero(found.chosen):
+        jumps = found.jumps[k]
+        passed = int(np.sum(jumps.gamma < scene.gamma))
+        row: dict[str, Any] = {
+            "length_m": float(cables.lam[k] * scene.radius),
+            "nodes": int(cables.nodes[k]),
+            "median": bool(cables.nodes[k] == passed and not cables.outer[k]),
+            "x_f_m": float(cables.x_f[k] * scene.radius),
+            "tension_N": float(cables.tension[k] * force),
+            "nearest_n": None,
+            "nearest_gamma": None,
+            "distance_gamma": None,
+            "distance_relative": None,
+            "distance_m_s": None,
+        }
+        at = jumps.nearest(scene.gamma)
+        if at >= 0:
+            distance = float(jumps.gamma[at]) - scene.gamma
+            row |= {
+                "nearest_n": int(jumps.n[at]),
+                "nearest_gamma": float(jumps.gamma[at]),
+                "distance_gamma": distance,
+                "distance_relative": distance / scene.gamma,
+                "distance_m_s": float(scene.speed_of(distance)),
+            }
+        rows.append(row)
+    return rows
+
+
+def _reason(found: Design) -> str:
+    scene, cables = found.scene, found.cables
+    if not len(cables):
+        groups = scene.groups("vacuum")
+        deepest = float(equilibria(found.longest / scene.radius, groups.w_f, groups.gamma).z_f.max()) * scene.radius
+        return (
+            f"no cable up to {found.longest:.4g} m has an equilibrium with the fish at {found.depth:.6g} m: the "
+            f"deepest of the longest one is at {deepest:.6g} m; a longer one may, with --max-length, or a slower tow"
+        )
+    nearest = int(np.argmin(np.abs(cables.x_f)))
+    return (
+        f"none of the {len(cables)} cables up to {found.longest:.4g} m with the fish at {found.depth:.6g} m has it "
+        f"within {found.max_radius:.6g} m of the axis; nearest to it, {abs(cables.x_f[nearest]) * scene.radius:.6g} m, "
+        f"comes a cable of {cables.lam[nearest] * scene.radius:.6g} m with {cables.nodes[nearest]} nodes"
+    )
+
+
+def _text(found: Design, rows: list[dict[str, Any]]) -> str:
+    scene = found.scene
+    lines = [
+        scene.title or scene.source,
+        describe_speed(scene),
+        f"fish at {found.depth:.6g} m, cables up to {found.longest:.4g} m (vacuum model); nearest jump: its number, "
+        "critical speed less the scene's",
+        "",
+        f"{'length m':>13} {'nodes':>5} {'fish x m':>13} {'tension N':>13} {'n':>4} {'%':>8} {'gamma':>9} {'m/s':>9}",
+    ]
+    for row in rows:
+        cells = f"{row['length_m']:>13.8g} {row['nodes']:>5} {row['x_f_m']:>13.6g} {row['tension_N']:>13.6g}"
+        if row["nearest_n"] is None:
+            jump = f" {'-':>4} {'-':>8} {'-':>9} {'-':>9}"
+        else:
+            jump = (
+                f" {row['nearest_n']:>4} {100 * row['distance_relative']:>+8.2f} {row['distance_gamma']:>+9.4g} "
+                f"{row['distance_m_s']:>+9.4g}"
+            )
+        lines.append(cells + jump + ("  median" if row["median"] else ""))
+    return "\n".join(lines)

@@ -1,0 +1,87 @@
+"""`towatlas shape`: the shape of one equilibrium, as a file or a figure."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from atlas.commands.common import (
+    FIGURE_FORMATS,
+    OK,
+    announce_compilation,
+    length,
+    new_figure,
+    number,
+    save_figure,
+    say,
+    speed,
+    weight,
+)
+from atlas.nomenclature import EQUILIBRIUM
+from atlas.shape import POINTS, shape
+
+FORMATS = (".nc", ".csv", *FIGURE_FORMATS)
+COLUMNS = ("s", "x", "z", "R_x", "R_z", "T")
+
+
+def add(commands: Any) -> None:
+    """Declare the command."""
+    parser = commands.add_parser(
+        "shape",
+        help="the shape of one equilibrium",
+        description="Position, force and tension along the cable in one of its equilibria: as a table on standard "
+        "output, or as a file or a figure.",
+    )
+    parser.add_argument("--lam", type=length, required=True, metavar="LAMBDA", help=EQUILIBRIUM["lam"].long_name)
+    parser.add_argument("--wf", type=weight, required=True, metavar="W_F", help=EQUILIBRIUM["w_f"].long_name)
+    parser.add_argument("--gamma", type=speed, required=True, metavar="GAMMA", help=EQUILIBRIUM["gamma"].long_name)
+    parser.add_argument(
+        "--root",
+        default="median",
+        metavar="ROOT",
+        help="median (the default), outward, or a row of `towatlas equilibria`, counted from 0",
+    )
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--points", type=int, default=POINTS, metavar="N", help="evenly spaced, default %(default)s")
+    where.add_argument("--s", type=number, nargs="+", metavar="S", help="arc lengths from the tow point [tow radii]")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="FILE.nc, .csv, .svg, .png or .pdf")
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    if options.out and options.out.suffix.lower() not in FORMATS:
+        raise ValueError(f"--out {options.out}: the ending must be one of {', '.join(FORMATS)}")
+    if options.points < 2:
+        raise ValueError(f"--points {options.points}: a shape has two points or more")
+    announce_compilation("shoot_each", 5)
+    root = int(options.root) if options.root.isdecimal() else options.root
+    arc = options.s if options.s else np.linspace(0.0, options.lam, options.points)
+    curve = shape(options.lam, options.wf, options.gamma, root=root, s=arc)
+    kind = options.out.suffix.lower() if options.out else ".csv"
+    if kind == ".nc":
+        from atlas.dataset import write_atlas
+
+        write_atlas(options.out, curve, {})
+    elif kind == ".csv":
+        _write_csv(curve, options.out)
+    else:
+        from atlas.plot import plot_shape
+
+        figure, axes = new_figure(5.2, 6.4, "compressed")
+        plot_shape(curve, axes)
+        save_figure(figure, options.out)
+        return OK
+    if options.out:
+        say(f"wrote {options.out}")
+    return OK
+
+
+def _write_csv(curve: Any, path: Path | None) -> None:
+    facts = ", ".join(f"{name} = {curve.attrs[name]!r}" for name in ("lam", "w_f", "gamma", "R_x0"))
+    rows = np.stack([curve[name].values for name in COLUMNS], axis=1)
+    header = f"# {facts}, nodes = {curve.attrs['nodes']}\n{','.join(COLUMNS)}"
+    if path:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    np.savetxt(path or sys.stdout, rows, fmt="%.17g", delimiter=",", header=header, comments="")

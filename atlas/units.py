@@ -1,0 +1,139 @@
+"""Quantities with units as people write them, in SI: "0.1824 g/ft", "11/16 in", "3 kn"; a bare number is SI."""
+
+import functools
+import math
+import re
+from fractions import Fraction
+from typing import Any
+
+# Number, unit. The number may be a fraction, "11/16", or a mixed one, "1 1/2".
+_DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_QUANTITY = re.compile(rf"\s*([+-]?)\s*(?:(\d+)\s+(\d+)/(\d+)|({_DECIMAL})(?:\s*/\s*({_DECIMAL}))?)\s*(.*?)\s*")
+# What a number with units may be for; the message names it. Angles are told from pure numbers, see `_same`.
+_KINDS = {
+    "m": "a length",
+    "m^2": "an area",
+    "m^3": "a volume",
+    "m/s": "a speed",
+    "m/s^2": "an acceleration",
+    "rad/s": "a rate of rotation",
+    "kg": "a mass",
+    "kg/m": "a mass per length",
+    "kg/m^3": "a density",
+    "N": "a force",
+    "N/m": "a force per length",
+    "": "a pure number",
+}
+
+
+@functools.cache
+def _registry() -> Any:
+    # pint takes a third of a second to import: only who reads units pays.
+    import pint
+
+    registry: Any = pint.UnitRegistry()
+    registry.define("rev = revolution")
+    return registry
+
+
+def _same(one: Any, other: Any) -> bool:
+    """The same kind of quantity; "2 Hz", which pint takes for 2 rad/s, is no rate of rotation."""
+    return one.to_root_units().units == other.to_root_units().units
+
+
+def parse_quantity(name: str, value: Any, unit: str, bare: str | None = None) -> float:
+    """A quantity in SI.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in messages.
+    value : float or str
+        A number in SI, or text with a unit: decimal, fraction ("11/16 in") or mixed ("1 1/2 in").
+    unit : str
+        The SI unit wanted, one of m, m^2, m^3, m/s, m/s^2, rad/s, kg, kg/m, kg/m^3, N, N/m, and "" for a pure number.
+    bare : str, optional
+        The unit of a number without one, if not SI.
+
+    Returns
+    -------
+    float
+        In `unit`, to rounding.
+
+    Raises
+    ------
+    ValueError
+        If it is no number, not finite, or its unit is unknown or of another kind; the message names the key.
+
+    Examples
+    --------
+    >>> parse_quantity("radius", "11/16 in", "m")
+    0.0174625
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"{name} = {value!r} is not {_KINDS[unit]}; write a number in SI or a text as {_sample(unit)}")
+    if isinstance(value, str):
+        number, symbol = _split(name, value, unit)
+    else:
+        number, symbol = float(value), ""
+    if not math.isfinite(number):
+        raise ValueError(f"{name} = {value!r} is not finite")
+    if not isinstance(value, str):
+        symbol = bare or unit
+    if symbol == unit:
+        return number
+    return _convert(name, value, number, symbol, unit)
+
+
+def _split(name: str, text: str, unit: str) -> tuple[float, str]:
+    parts = _QUANTITY.fullmatch(text)
+    if parts is None:
+        raise ValueError(f"{name} = {text!r} is not {_KINDS[unit]}; write a number and its unit, as {_sample(unit)}")
+    sign, whole, above, below, number, divisor, symbol = parts.groups()
+    try:
+        if whole is not None:
+            value = Fraction(whole) + Fraction(int(above), int(below))
+        else:
+            value = Fraction(number) / Fraction(divisor or 1)
+        return float(-value if sign == "-" else value), symbol
+    except (ZeroDivisionError, OverflowError):
+        raise ValueError(f"{name} = {text!r} is not finite") from None
+
+
+def _convert(name: str, value: Any, number: float, symbol: str, unit: str) -> float:
+    registry = _registry()
+    wanted = registry.Quantity(1.0, unit)
+    try:
+        given = registry.Quantity(1.0, registry.Unit(symbol))
+    except Exception:  # pint raises whatever its parser meets
+        raise ValueError(f"{name} = {value!r}: unit {symbol!r} is unknown; write it as {_sample(unit)}") from None
+    if not given._is_multiplicative or not _same(given, wanted):
+        raise ValueError(f"{name} = {value!r} is not {_KINDS[unit]}{_hint(symbol, given, unit)}")
+    return float((number * given).to(wanted.units).magnitude)
+
+
+def _hint(symbol: str, given: Any, unit: str) -> str:
+    if symbol == "":
+        return f": it has no unit; write {_sample(unit)}, or the number alone, without quotes, for SI"
+    if unit == "rad/s" and given.check("1/[time]"):
+        return f": it is not clear whether {symbol!r} counts turns or radians; write rpm, rev/s or rad/s"
+    if unit in ("N", "N/m") and given.check("[mass]" if unit == "N" else "[mass]/[length]"):
+        return f" but a mass; write {'kgf or lbf' if unit == 'N' else 'kgf/m or lbf/ft'} for the weight of a mass"
+    return f"; write it as {_sample(unit)}"
+
+
+def _sample(unit: str) -> str:
+    return {
+        "m": '"120 m"',
+        "m^2": '"0.1 m^2"',
+        "m^3": '"12 l"',
+        "m/s": '"3 kn"',
+        "m/s^2": '"9.81 m/s^2"',
+        "rad/s": '"40 rpm"',
+        "kg": '"14.1 g"',
+        "kg/m": '"0.18 g/ft"',
+        "kg/m^3": '"1025 kg/m^3"',
+        "N": '"50 N"',
+        "N/m": '"2 N/m"',
+        "": "1.2",
+    }[unit]
