@@ -188,7 +188,7 @@ def _correct(
     return x, jacobian, second, good, quick
 
 
-def _between(curve: Curve, k: int, share: float) -> Array:
+def between(curve: Curve, k: int, share: float) -> Array:
     """Point on the cubic between points k and k + 1 of a curve."""
     a, b = curve.points[k], curve.points[k + 1]
     length = np.linalg.norm(b - a)
@@ -215,8 +215,8 @@ def solve_cusps(curves: list[Curve], lam: Array, w_f: Array, parallel: bool = Fa
             codes[row] = curve.status if curve.status != status.OK else status.NO_CUSP
             continue
         a, b = curve.curvatures[k], curve.curvatures[k + 1]
-        z[row] = _between(curve, k, a / (a - b))
-    active = np.isfinite(z).all(axis=1)
+        z[row] = between(curve, k, a / (a - b))
+    active = np.asarray(np.isfinite(z).all(axis=1))
     at = CUSP.at
     for _ in range(ROUNDS):
         i = np.flatnonzero(active)
@@ -256,25 +256,25 @@ def crossing(curve: Curve, log_c: float, before: bool) -> Array | None:
         begin = _cusp_height(curve, last) - log_c if not before and k == last else heights[k]
         if (begin < 0.0 <= end) if before else (begin > 0.0 >= end):
             shares = np.linspace(0.0, 1.0, 65)
-            line = np.array([_between(curve, k, share)[2] for share in shares]) - log_c
+            line = np.array([between(curve, k, share)[2] for share in shares]) - log_c
             sign = (line[:-1] < 0.0) & (line[1:] >= 0.0) if before else (line[:-1] > 0.0) & (line[1:] <= 0.0)
             hits = np.flatnonzero(sign)
             j = int(hits[0]) if len(hits) else int(np.argmin(np.abs(line[:-1])))
             gap = line[j] - line[j + 1]
-            return _between(curve, k, shares[j] + (line[j] / gap / 64.0 if len(hits) else 0.0))
+            return between(curve, k, shares[j] + (line[j] / gap / 64.0 if len(hits) else 0.0))
     return None
 
 
 def _cusp_height(curve: Curve, k: int) -> float:
     a, b = curve.curvatures[k], curve.curvatures[k + 1]
-    return float(_between(curve, k, a / (a - b))[2])
+    return float(between(curve, k, a / (a - b))[2])
 
 
 def solve_at(z: Array, lam: Array, w_f: Array, parallel: bool = False) -> tuple[Array, Array, NDArray[np.int64]]:
     """Folds at the drags of the guesses z: the same columns, relative errors of gamma, statuses; nan rows pass."""
     z = z.copy()
     error, codes = np.full(len(z), np.nan), np.full(len(z), status.NOT_CONVERGED)
-    active = np.isfinite(z).all(axis=1)
+    active = np.asarray(np.isfinite(z).all(axis=1))
     last = np.full(len(z), np.inf)
     for _ in range(3 * ROUNDS):
         i = np.flatnonzero(active)
