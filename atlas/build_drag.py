@@ -23,7 +23,7 @@ from kernels import status
 Array = NDArray[np.float64]
 
 # Curves traced together: enough for all threads, few enough for the bar to move.
-BATCH = 32
+BATCH = 70
 # The error of a series is taken as this many times the worst found at points between its nodes.
 MARGIN = 3.0
 
@@ -41,10 +41,10 @@ class DragGrid:
     lam_max: float = 60.0
     w_f_max: float = 2000.0
     sigma_min: float = -0.5
-    series_lam: int = 9
-    series_w_f: int = 14
-    series_sigma: int = 14
-    checks: int = 16
+    series_lam: int = 7
+    series_w_f: int = 10
+    series_sigma: int = 12
+    checks: int = 12
     w_f: Array = field(default_factory=lambda: np.concatenate([[0.0], 10.0 ** np.linspace(-1.0, 3.25, 18)]))
     lam: Array = field(default_factory=lambda: np.geomspace(12.0, 60.0, 15))
     C: Array = field(default_factory=_c_grid)
