@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 ATLAS := build/atlas.nc
 
 .DEFAULT_GOAL := help
-.PHONY: help install atlas equilibria test bench failures check figures clean
+.PHONY: help install atlas equilibria drag test bench failures check figures clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
@@ -23,6 +23,9 @@ atlas: install  ## build build/atlas.nc
 
 equilibria: install  ## build build/equilibria.nc, the table of fish positions
 	$(BIN)/python -m atlas build --equilibria
+
+drag: install  ## build build/drag.nc, the table of folds with drag; some minutes
+	$(BIN)/python -m atlas build --drag
 
 test: install  ## run the tests
 	$(BIN)/python -m pytest

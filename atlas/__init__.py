@@ -6,6 +6,8 @@ Importing this package, opening an atlas and looking a value up need numpy and n
 
 from atlas.critical import CriticalStates, solve_critical
 from atlas.drag import DragEquilibria, DragShape, drag_shape
+from atlas.drag_folds import DragFolds, solve_drag_folds
+from atlas.drag_table import DragLookup, DragTable, open_drag
 from atlas.equilibria import Equilibria, equilibria
 from atlas.limits import excess_length, massless_cable, threshold_length
 from atlas.lookup import Atlas, open_atlas
@@ -19,7 +21,10 @@ __all__ = [
     "AtlasFileError",
     "CriticalStates",
     "DragEquilibria",
+    "DragFolds",
+    "DragLookup",
     "DragShape",
+    "DragTable",
     "Equilibria",
     "EquilibriaTable",
     "FishPositions",
@@ -28,8 +33,10 @@ __all__ = [
     "excess_length",
     "massless_cable",
     "open_atlas",
+    "open_drag",
     "open_equilibria",
     "shape",
     "solve_critical",
+    "solve_drag_folds",
     "threshold_length",
 ]

@@ -27,8 +27,8 @@ TINY = 1e-300
 # The fish is never farther out than a straight cable reaches.
 BEYOND = 1.0 + 1e-9
 # Steps in log C of the continuation from a vacuum, from a drag so small that it is one.
-CONTINUATION_STEPS = 40
-VACUUM = 1e-6
+CONTINUATION_STEPS = 24
+VACUUM = 1e-3
 SAME_ROOT = 1e-7
 # Steps this small, in log r, are the last: the square of them is rounding.
 LAST_STEP = 1e-9

@@ -50,15 +50,20 @@ def polynomials(x: Array, count: int) -> Array:
     return values
 
 
+def transform(count: int) -> Array:
+    """Matrix from values on `nodes(count)` to the coefficients of the Chebyshev series through them."""
+    k = np.arange(count)
+    table = np.cos(np.pi * np.outer(k, k[::-1]) / (count - 1)) * (2.0 / (count - 1))
+    table[:, [0, -1]] *= 0.5
+    table[[0, -1], :] *= 0.5
+    return table
+
+
 def coefficients(values: Array) -> Array:
     """Coefficients of the Chebyshev series through values on `nodes`, along both last axes."""
-    # einsum with optimize=False: plain sums, so that the file does not depend on the threads of a BLAS.
     for axis in (-2, -1):
-        count = values.shape[axis]
-        k = np.arange(count)
-        table = np.cos(np.pi * np.outer(k, k[::-1]) / (count - 1)) * (2.0 / (count - 1))
-        table[:, [0, -1]] *= 0.5
-        table[[0, -1], :] *= 0.5
+        table = transform(values.shape[axis])
+        # einsum with optimize=False: plain sums, so that the file does not depend on the threads of a BLAS.
         values = np.einsum("ki,...ij->...kj" if axis == -2 else "kj,...ij->...ik", table, values, optimize=False)
     return values
 

@@ -100,3 +100,11 @@ _ONE_STATE = (
 EQUILIBRIUM = {
     name: replace(symbol, long_name=symbol.long_name.removesuffix(_AT_FOLD)) for name, symbol in SYMBOLS.items()
 } | {symbol.name: symbol for symbol in _ONE_STATE}
+
+_FOLDS_WITH_DRAG = (
+    Symbol("C", "drag constant of the cable, (1/2) rho C_D d R / (mu + rho A)", "$C$", f"{REPORT}, Eq. (13c)"),
+    Symbol("C_cusp", "drag constant above which the n-th pair of equilibria never appears", "$C^*_n$", "towatlas"),
+    Symbol("appears", "speed at which the n-th pair of equilibria appears", r"$\gamma_{cn}(C)$", "towatlas"),
+    Symbol("ends", "speed at which the outer member of the n-th pair is gone", r"$\gamma_{en}(C)$", "towatlas"),
+)
+DRAG = SYMBOLS | {symbol.name: symbol for symbol in _FOLDS_WITH_DRAG}

@@ -12,6 +12,9 @@ NOT_FOUND = 5
 BAD_INPUT = 6
 LOST_IN_ROUNDING = 7
 NEAR_FOLD = 8
+NO_PAIR = 9
+NEVER_ENDS = 10
+NO_CUSP = 11
 
 SENTENCES = {
     OK: "computed",
@@ -23,10 +26,13 @@ SENTENCES = {
     BAD_INPUT: "an input is not finite, not positive (lambda), negative (w_f), or so large or small that it overflows",
     LOST_IN_ROUNDING: "lambda is so close to lambda_cn that rounding leaves fewer than four digits of the answer",
     NEAR_FOLD: "too close to a fold to interpolate; ask for the direct solver",
+    NO_PAIR: "too much drag: the pair never appears",
+    NEVER_ENDS: "the pair does not end up to the highest speed looked at",
+    NO_CUSP: "no cusp: as the drag rises, the pair appears at ever higher speed, up to the highest looked at",
 }
 
 # Names for CF flag_meanings: one word each, in the order of the codes.
 FLAG_MEANINGS = (
     "computed no_transition step_limit not_converged outside_atlas not_found_by_scan bad_input lost_in_rounding "
-    "near_fold"
+    "near_fold no_pair never_ends no_cusp"
 )

@@ -1,10 +1,15 @@
-"""Drag: equilibria against an independent integration, against limits, balances and the photographs of the report."""
+"""Drag: equilibria against independent methods, limits, balances and the photographs of the report."""
 
 import json
+import re
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+import reference_drag
+from scipy.integrate import solve_bvp
 from test_cli import run
 
 import atlas
@@ -25,43 +30,27 @@ PHOTOGRAPHS = [
 ]
 
 
+@cache
+def in_air(lam, w_f, gamma):
+    return atlas.equilibria(lam, w_f, gamma, C=0.018)
+
+
 @pytest.mark.parametrize(("lam", "w_f", "gamma", "photographed", "vacuum"), PHOTOGRAPHS)
 def test_nodes_of_the_photographs(lam, w_f, gamma, photographed, vacuum):
     """The report's own drag constant gets all eight, its vacuum six."""
-    found = atlas.equilibria(lam, w_f, gamma, C=0.018)
+    found = in_air(lam, w_f, gamma)
     assert found.nodes[found.near_axis][0] == photographed
+    assert len(found) == 3
     median = atlas.equilibria(lam, w_f, gamma)
     assert median.nodes[median.median][0] == vacuum
 
 
-def _slopes(s, state, gamma2, c, w, c_t):
-    """Eqs. (19)-(21), as vectors."""
-    position, force = state[:3], state[3:]
-    tangent = force / np.sqrt(force @ force)
-    velocity = np.array([-position[1], position[0], 0.0])
-    along = velocity @ tangent
-    across = velocity - along * tangent
-    load = np.array([gamma2 * position[0], gamma2 * position[1], w])
-    load -= gamma2 * (c * np.sqrt(across @ across) * across + c_t * abs(along) * along * tangent)
-    return np.concatenate([tangent, -load])
-
-
-def reference_shot(r, gamma, system):
-    """State at the tow point, x, y, z, R, of a shot with the fish at (r, 0, 0), by DOP853."""
-    g2 = gamma**2
-    start = np.array([r, 0, 0, g2 * system.m_f * r, -system.C_f * g2 * r * r, system.w_f])
-    arguments = g2, system.C, system.w, system.C_t
-    solved = solve_ivp(_slopes, (system.lam, 0.0), start, method="DOP853", rtol=3e-14, atol=1e-30, args=arguments)
-    assert solved.success
-    return solved.y[:, -1]
-
-
 def random_systems(rows, seed):
-    """Systems and fish radii over the domain, uniform in the logarithms; a fish on each."""
+    """Systems and fish radii over the domain, uniform in the logarithms; every fifth without a fish."""
     rng = np.random.default_rng(seed)
-    for _ in range(rows):
+    for k in range(rows):
         gamma = 10 ** rng.uniform(np.log10(0.05), np.log10(50))
-        lam, w_f = 10 ** rng.uniform(-0.3, np.log10(200)), 10 ** rng.uniform(-3, 4)
+        lam, w_f = 10 ** rng.uniform(-0.3, np.log10(200)), (k % 5 > 0) * 10 ** rng.uniform(-3, 4)
         c = 10 ** rng.uniform(-3, 1)
         system = System(
             lam,
@@ -75,22 +64,22 @@ def random_systems(rows, seed):
         yield gamma, system, (1 + lam) * 10 ** rng.uniform(-4, 0)
 
 
-def test_shots_agree_with_dop853():
-    """Relative to the local amplitude of the wave and to what moving the fish by rounding does to the tow point."""
+def test_shots_agree_with_long_doubles():
+    """Relative to the amplitude of the wave, and to the force, and to what moving the fish does to them."""
     worst = []
     for gamma, system, r in random_systems(40, 4):
         ends = shoot([r * gamma**2], gamma, system.row(), jets_of(1))
-        x, y, _, *force = reference_shot(r, gamma, system)
+        x, y, _, *force = reference_drag.shot(r, gamma, system)
         scale = gamma**-2
         mine = np.array([ends.X[0, 0], ends.Y[0, 0], ends.FX[0, 0], ends.FY[0, 0], ends.FZ[0, 0]]) * scale
-        amplitude = np.hypot(np.hypot(x, y), np.hypot(*force[:2]) / gamma / np.linalg.norm(force) ** 0.5)
-        slope = np.hypot(ends.X[0, 1], ends.Y[0, 1]) * scale / amplitude
-        error = np.hypot(mine[0] - x, mine[1] - y) / amplitude
-        worst.append(error / (1.0 + slope))
-        assert np.linalg.norm(mine[2:] - force) / np.linalg.norm(force) / (1.0 + slope) < 1e-11
+        size = np.sqrt(np.dot(force, force))
+        amplitude = np.hypot(np.hypot(x, y), np.hypot(*force[:2]) / gamma / np.sqrt(size))
+        slope = 1.0 + np.hypot(ends.X[0, 1], ends.Y[0, 1]) * scale / amplitude
+        worst.append(float(np.hypot(mine[0] - x, mine[1] - y) / amplitude / slope))
+        assert np.abs(mine[2:] - force).max() / size / slope < 1e-12
         assert ends.status[0] == 0
-    assert max(worst) < 1e-11
-    assert np.median(worst) < 1e-13
+    assert max(worst) < 1e-12
+    assert np.median(worst) < 1e-15
 
 
 def test_vacuum_as_drag_vanishes():
@@ -126,3 +115,161 @@ def test_shape_ends_where_it_should():
     assert shape.y[0] == pytest.approx(0.0, abs=1e-12)
     assert shape.z[-1] == pytest.approx(found.z_f[0], rel=1e-14)
     assert shape.T[0] == pytest.approx(found.tension[0], rel=1e-14)
+
+
+def test_largest_deflection_as_photographed():
+    """Of the shapes shown in the y-z plane only that of Fig. 8b has a deflection to speak of."""
+    largest = {}
+    for lam, w_f, gamma, _, _ in PHOTOGRAPHS[:5]:
+        found = in_air(lam, w_f, gamma)
+        largest[lam, gamma] = np.abs(drag_shape(found, 0, np.linspace(0, lam, 400)).y).max()
+    assert max(largest, key=largest.get) == (52.4, 4.77)
+
+
+def test_single_equilibrium_near_the_axis():
+    """With the report's drag the second fold is gone: one shape near the axis, two with the cable stretched out."""
+    for gamma in (1.6, 3.0, 4.5, 6.5):
+        found = atlas.equilibria(37.8, 1352, gamma, C=0.018)
+        assert (found.r_f < 1).sum() == 1
+        assert (found.r_f > 36).sum() == 2
+        assert len(found) == 3
+
+
+FULL = System(12.0, 2.0, 3.0, C=0.3, C_f=0.2, w=0.8, C_t=0.05)
+
+
+def _full():
+    s = FULL
+    return atlas.equilibria(s.lam, s.w_f, 0.8, C=s.C, m_f=s.m_f, C_f=s.C_f, w=s.w, C_t=s.C_t)
+
+
+@pytest.mark.parametrize("found", [_full, lambda: atlas.equilibria(8.0, 0.0, 1.1, C=0.05)])
+def test_balance_of_forces_and_moments(found):
+    """The reaction at the tow point carries the loads of the whole cable and of the fish, and their moments."""
+    found = found()
+    system, g2 = found.system, found.gamma**2
+    edges = np.linspace(0, found.lam, 61)
+    x, weights = np.polynomial.legendre.leggauss(12)
+    # Towards the fish the shape of a bare tip bends on ever smaller lengths.
+    s = (0.5 * (edges[1:] + edges[:-1])[:, None] + 0.5 * np.diff(edges)[:, None] * x).ravel()
+    weight = np.outer(0.5 * np.diff(edges), weights).ravel()
+    for which in range(len(found)):
+        shape = drag_shape(found, which, s)
+        position = np.stack([shape.x, shape.y, shape.z])
+        force = np.stack([shape.R_x, shape.R_y, shape.R_z])
+        tangent = force / shape.T
+        velocity = np.stack([-shape.y, shape.x, 0 * shape.x])
+        along = np.sum(velocity * tangent, axis=0)
+        across = velocity - along * tangent
+        load = np.stack([g2 * shape.x, g2 * shape.y, np.full(len(s), system.w)])
+        load -= g2 * system.C * np.linalg.norm(across, axis=0) * across
+        load -= g2 * system.C_t * np.abs(along) * along * tangent
+        fish = np.array([found.x_f[which], found.y_f[which], found.z_f[which]])
+        r_f = np.hypot(*fish[:2])
+        on_fish = np.array([g2 * system.m_f * fish[0], g2 * system.m_f * fish[1], system.w_f])
+        on_fish -= system.C_f * g2 * r_f * np.array([-fish[1], fish[0], 0])
+        reaction = np.array([found.R_x0[which], found.R_y0[which], found.R_z0[which]])
+        total = load @ weight + on_fish
+        scale = np.linalg.norm(reaction) + np.abs(load).sum(axis=0) @ weight
+        np.testing.assert_allclose(total, reaction, atol=1e-9 * scale)
+        moments = np.cross(position.T, load.T).T @ weight + np.cross(fish, on_fish)
+        np.testing.assert_allclose(moments, np.cross([1, 0, 0], reaction), atol=1e-9 * scale * (1 + found.lam))
+        assert np.linalg.norm(reaction) == pytest.approx(found.tension[which], rel=1e-13)
+
+
+def test_collocation_finds_the_same_equilibria():
+    """scipy's solve_bvp on the six equations and boundary conditions (20)-(23), from a guess a percent off."""
+    found = _full()
+    system, g2 = found.system, found.gamma**2
+
+    def slopes(s, states):
+        columns = [reference_drag.slopes(state, g2, system.C, system.w, system.C_t) for state in states.T]
+        return np.stack(columns, axis=1).astype(float)
+
+    def ends(a, b):
+        load = g2 * np.array([system.m_f * b[0], system.m_f * b[1]])
+        load -= system.C_f * g2 * np.hypot(b[0], b[1]) * np.array([-b[1], b[0]])
+        return np.array([a[0] - 1, a[1], a[2], b[3] - load[0], b[4] - load[1], b[5] - system.w_f])
+
+    s = np.linspace(0, found.lam, 200)
+    for which in range(len(found)):
+        shape = drag_shape(found, which, s)
+        guess = np.stack([shape.x, shape.y, shape.z, shape.R_x, shape.R_y, shape.R_z])
+        solved = solve_bvp(slopes, ends, s, guess * (1 + 0.01 * np.cos(s)), tol=1e-8, max_nodes=20000)
+        assert solved.status == 0
+        assert np.hypot(*solved.y[:2, -1]) == pytest.approx(found.r_f[which], rel=1e-6)
+        assert solved.y[3, 0] == pytest.approx(found.R_x0[which], rel=1e-6, abs=1e-6 * found.tension[which])
+
+
+@pytest.mark.parametrize("w", [1.0, 0.5])
+def test_straight_trailing_cable(w):
+    """A tow circle far larger than the cable: a straight line at Pode's critical angle, w cos(phi) = D sin^2(phi)."""
+    ratio = 2.0  # drag of a cable across the stream, over (mu + rho A) g
+    cosine = (np.sqrt(w * w + 4 * ratio**2) - w) / (2 * ratio)
+    sine = np.sqrt(1 - cosine**2)
+    wrong = []
+    for small in (1e-3, 1e-4):
+        found = atlas.equilibria(small, 0.0, np.sqrt(small), C=ratio / small, w=w)
+        assert len(found) == 1
+        assert found.nodes[0] == 0
+        offset = np.array([-found.y_f[0], found.z_f[0]]) / small
+        wrong.append(np.abs(offset - [cosine, sine]).max())
+    # The circle bends the flow, and the cable, towards x: y and z see the square of it.
+    assert wrong[0] < 1e-6
+    assert wrong[1] == pytest.approx(0.01 * wrong[0], rel=0.05)
+
+
+def test_jets_are_derivatives():
+    """To fourth order in the difference, on a shot with every term switched on."""
+    jets, r, gamma, h = jets_of(3, gamma=True, drag=True), 3.0, 0.9, 1e-3
+    jet = shoot([r], gamma, FULL.row(), jets).log_rho[0]
+
+    def shifted(log_r=0.0, log_gamma=0.0, log_drag=0.0):
+        system = replace(FULL, C=FULL.C * np.exp(log_drag))
+        return shoot([r * np.exp(log_r)], gamma * np.exp(log_gamma), system.row(), jets).log_rho[0]
+
+    for axis, unit in enumerate(np.eye(3)):
+        plus, minus, far, further = (shifted(*(k * h * unit)) for k in (1, -1, 2, -2))
+        # Of log rho and of its slope in log r.
+        for k in range(2):
+            monomial = [k, 0, 0]
+            monomial[axis] += 1
+            many = k + 1 if axis == 0 else 1
+            at = jets.at(k, 0, 0)
+            difference = (8 * (plus[at] - minus[at]) - (far[at] - further[at])) / (12 * h)
+            assert many * jet[jets.at(*monomial)] == pytest.approx(difference, rel=1e-8, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"C": -0.1}, "C must be finite and not negative"),
+        ({"C": np.nan}, "C must be finite"),
+        ({"C": [0.1, 0.2]}, "C must be one number"),
+        ({"C_f": "much"}, "C_f must be a real number"),
+        ({"m_f": -1}, "m_f must be finite and not negative"),
+        ({"w": -1}, "w = .* must be one number above -1"),
+        ({"w": 1.5}, "at most 1"),
+    ],
+)
+def test_bad_systems(options, message):
+    with pytest.raises(ValueError, match=message):
+        atlas.equilibria(5, 1, 1, **options)
+
+
+def test_bad_points_of_a_shape():
+    found = atlas.equilibria(5, 1, 1, C=0.1)
+    with pytest.raises(ValueError, match="on the cable, 0 to 5"):
+        drag_shape(found, 0, [5.1])
+    with pytest.raises(ValueError, match="which must be 0 to"):
+        drag_shape(found, 17, [1.0])
+    with pytest.raises(ValueError, match="give it a fish"):
+        atlas.equilibria(5, 0, 1, C=0.1, w=0)
+
+
+def test_python_of_the_page_runs():
+    text = (Path(__file__).parent.parent / "docs" / "drag.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", text, re.S)
+    assert len(blocks) == 2
+    for block in blocks:
+        exec(block, {})

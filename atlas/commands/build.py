@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from atlas.commands.common import OK, threads
+from atlas.drag_table import default_drag_path
 from atlas.lookup import default_path
 from atlas.table import DEFAULT_PATH
 
@@ -16,12 +17,18 @@ def add(commands: Any) -> None:
         "--out",
         type=Path,
         metavar="FILE",
-        help=f"default {default_path()}, {DEFAULT_PATH} for --equilibria, build/scan.nc for --method scan",
+        help=f"default {default_path()}, {DEFAULT_PATH} for --equilibria, {default_drag_path()} for --drag, "
+        "build/scan.nc for --method scan",
     )
     parser.add_argument(
         "--equilibria",
         action="store_true",
         help="a table of equilibria over (w_f, lambda, gamma) instead: where the fish is, beside the jumps",
+    )
+    parser.add_argument(
+        "--drag",
+        action="store_true",
+        help="a table of folds with drag instead: where pairs of equilibria appear and end; takes some minutes",
     )
     parser.add_argument(
         "--method",
@@ -42,6 +49,13 @@ def _run(options: argparse.Namespace) -> int:
         from atlas.build_equilibria import build_equilibria
 
         print(build_equilibria(options.out or DEFAULT_PATH, **how))
+        return OK
+    if options.drag:
+        if options.method:
+            raise ValueError("--method says how critical speeds are found; a table with --drag has one method")
+        from atlas.build_drag import build_drag
+
+        print(build_drag(options.out or default_drag_path(), **how))
         return OK
     from atlas.build import build_atlas
 

@@ -3,6 +3,7 @@
 import argparse
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,15 @@ from atlas.commands.common import (
     OUTSIDE,
     add_atlas,
     announce_compilation,
+    drag,
     length,
     order,
     say,
     weight,
 )
 from atlas.critical import CriticalStates, solve_critical
+from atlas.drag_folds import solve_drag_folds
+from atlas.drag_table import default_drag_path, open_drag
 from atlas.limits import transitions, unchecked_threshold_length
 from atlas.lookup import Atlas, open_atlas
 from atlas.nomenclature import REPORT, SYMBOLS
@@ -27,6 +31,8 @@ from kernels import status
 
 # Transitions solved at once when none is named; a cable of 1e4 tow radii has 5000.
 MOST_SOLVED = 1000
+# Transitions with drag that are answered when none is named.
+MOST_WITH_DRAG = 3
 
 
 def add(commands: Any) -> None:
@@ -40,6 +46,15 @@ def add(commands: Any) -> None:
     parser.add_argument("--lam", type=length, required=True, metavar="LAMBDA", help=SYMBOLS["lam"].long_name)
     parser.add_argument("--wf", type=weight, required=True, metavar="W_F", help=SYMBOLS["w_f"].long_name)
     parser.add_argument("--n", type=order, metavar="N", help="one transition; without it every one that exists")
+    parser.add_argument(
+        "--C",
+        type=drag,
+        metavar="C",
+        help="with drag: its constant (1/2) rho C_D d R / (mu + rho A); from --drag-file, or solved with --solve",
+    )
+    parser.add_argument(
+        "--drag-file", type=Path, metavar="FILE", help=f"made by `towatlas build --drag`; default {default_drag_path()}"
+    )
     add_atlas(parser)
     parser.add_argument(
         "--solve", action="store_true", help="solve directly instead of looking up: any n, any length, no atlas needed"
@@ -50,6 +65,8 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     lam, w_f = options.lam, options.wf
+    if options.C is not None:
+        return _run_drag(options)
     existing = transitions(lam, w_f)
     atlas = None if options.solve else open_atlas(options.atlas)
     limit = MOST_SOLVED if atlas is None else atlas.n_max
@@ -62,6 +79,48 @@ def _run(options: argparse.Namespace) -> int:
     states = solve_critical(lam, w_f, orders) if atlas is None else atlas.states(lam, w_f, orders, outside="nan")
     print(_as_json(states) if options.json else _as_table(states), end="")
     return _verdict(states, lam, w_f, atlas)
+
+
+def _run_drag(options: argparse.Namespace) -> int:
+    """Where pairs of equilibria appear and end with drag."""
+    existing = transitions(options.lam, options.wf)
+    orders = np.arange(1, min(existing, MOST_WITH_DRAG) + 1) if options.n is None else np.array([options.n])
+    cable = options.lam, options.wf, options.C, orders
+    if options.solve:
+        announce_compilation("shoot_drag", 10)
+        folds: Any = solve_drag_folds(*cable)
+    else:
+        folds = open_drag(options.drag_file).folds(*cable, outside="nan")
+    words = status.FLAG_MEANINGS.split()
+    names = ("appears", "ends", "C_cusp", "error")
+    rows = [
+        {"n": int(n)}
+        | {name: _or_none(getattr(folds, name)[k]) for name in names}
+        | {"status": words[int(folds.status[k])], "status_ends": words[int(folds.status_ends[k])]}
+        for k, n in enumerate(orders)
+    ]
+    if options.json:
+        print(json.dumps(rows, indent=1))
+    elif rows:
+        print(f"{'n':>4} {'appears':>20} {'ends':>20} {'C*_n':>14} {'error':>8}  status, of ends")
+        for row in rows:
+            cells = " ".join(f"{'-' if row[k] is None else format(row[k], '.13g'):>20}" for k in ("appears", "ends"))
+            cusp, error = (
+                "-" if row[k] is None else format(row[k], f) for k, f in (("C_cusp", ".8g"), ("error", ".1e"))
+            )
+            print(f"{row['n']:>4} {cells} {cusp:>14} {error:>8}  {row['status']}, {row['status_ends']}")
+    codes = folds.status
+    if (codes == status.OK).any():
+        return OK
+    if (codes == status.OUTSIDE).any():
+        say("outside the file of folds with drag; --solve computes such points directly")
+        return OUTSIDE
+    say(f"no pair: {status.SENTENCES[int(codes[0])] if len(codes) else status.SENTENCES[status.NO_TRANSITION]}")
+    return NO_STATE if not len(codes) or (codes != status.NOT_CONVERGED).any() else FAILED
+
+
+def _or_none(value: Any) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 def _verdict(states: CriticalStates, lam: float, w_f: float, atlas: Atlas | None) -> int:

@@ -4,14 +4,18 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from atlas.commands.common import FIGURE_FORMATS, OK, add_atlas, new_figure, save_figure
+from atlas.commands.common import FIGURE_FORMATS, OK, add_atlas, announce_compilation, new_figure, save_figure
 from atlas.lookup import open_atlas
 
 
 def add(commands: Any) -> None:
     """Declare the command."""
-    parser = commands.add_parser("plot", help="draw a figure", description="Draw a figure from an atlas.")
-    parser.add_argument("figure", choices=("critical",), help="critical speeds against cable length")
+    parser = commands.add_parser("plot", help="draw a figure", description="Draw a figure, `critical` from an atlas.")
+    parser.add_argument(
+        "figure",
+        choices=("critical", "drag"),
+        help="critical: speeds against cable length; drag: how drag closes the jumps, solved",
+    )
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="FILE.svg, .png or .pdf")
     add_atlas(parser)
     parser.set_defaults(run=_run)
@@ -20,6 +24,14 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     if options.out.suffix.lower() not in FIGURE_FORMATS:
         raise ValueError(f"--out {options.out}: the ending must be one of {', '.join(FIGURE_FORMATS)}")
+    if options.figure == "drag":
+        announce_compilation("shoot_drag", 10)
+        figure, axes = new_figure(7.2, 4.8)
+        from atlas.plot_drag import plot_drag_folds
+
+        plot_drag_folds(ax=axes)
+        save_figure(figure, options.out)
+        return OK
     atlas = open_atlas(options.atlas)
     figure, axes = new_figure(7.2, 4.8)
     from atlas.plot import plot_critical

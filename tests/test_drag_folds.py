@@ -1,0 +1,171 @@
+"""Folds with drag: what happens at them, the cusp, the file, its lookup, the shell."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from test_cli import run
+
+import atlas
+from atlas.build_drag import DragGrid, build_drag
+from atlas.drag_folds import solve_drag_folds
+from atlas.drag_table import open_drag
+from kernels import status
+
+TINY = DragGrid(
+    n_max=1,
+    lam_min=12.0,
+    lam_max=14.0,
+    w_f_max=1.0,
+    series_lam=3,
+    series_w_f=3,
+    series_sigma=8,
+    checks=2,
+    w_f=np.array([0.0, 1.0]),
+    lam=np.array([12.0, 14.0]),
+    C=np.array([0.0, 0.01, 0.03, 0.1]),
+)
+
+
+@pytest.fixture(scope="module")
+def drag_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("drag") / "drag.nc"
+    summary = build_drag(path, grid=TINY, progress=False)
+    return path, summary
+
+
+@pytest.mark.parametrize(("lam", "w_f", "C", "n"), [(37.8, 1352, 0.01, 2), (10, 0, 0.03, 1)])
+def test_two_equilibria_more_and_two_fewer(lam, w_f, C, n):
+    """The search in the radius of the fish, which knows nothing of folds, finds what they say."""
+    folds = solve_drag_folds(lam, w_f, C, n)
+    appears, ends = float(folds.appears), float(folds.ends)
+    count = [len(atlas.equilibria(lam, w_f, g, C=C)) for g in (appears * 0.9999, appears * 1.0001)]
+    assert count[1] == count[0] + 2
+    count = [len(atlas.equilibria(lam, w_f, g, C=C)) for g in (ends * 0.9999, ends * 1.0001)]
+    assert count[1] == count[0] - 2
+
+
+def test_from_the_vacuum_to_the_cusp():
+    faint = solve_drag_folds(37.8, 1352, [0.0, 1e-9, 1e-5], 2)
+    vacuum = atlas.solve_critical(37.8, 1352, 2)
+    assert faint.appears[0] == float(vacuum.gamma)
+    np.testing.assert_allclose(faint.appears, float(vacuum.gamma), rtol=1e-8)
+    assert (faint.status_ends == status.NEVER_ENDS).all()
+    cusp = float(faint.C_cusp[0])
+    # The speeds of both folds meet at the cusp like (C* - C)^(3/2).
+    near = solve_drag_folds(37.8, 1352, cusp * (1 - np.array([1e-2, 1e-4, -1e-6])), 2)
+    gap = near.ends[:2] - near.appears[:2]
+    assert (gap > 0).all()
+    assert gap[0] / gap[1] == pytest.approx(1000, rel=0.1)
+    assert near.status[2] == near.status_ends[2] == status.NO_PAIR
+    assert np.isnan(near.appears[2])
+    assert near.sentence(2) == status.SENTENCES[status.NO_PAIR]
+
+
+def test_the_report_s_cable():
+    """At C = 0.018 the second pair is gone, the third comes and goes, the first stays for good."""
+    folds = solve_drag_folds(37.8, 1352, 0.018, [1, 2, 3])
+    assert list(folds.status) == [status.OK, status.NO_PAIR, status.OK]
+    assert list(folds.status_ends) == [status.NEVER_ENDS, status.NO_PAIR, status.OK]
+    assert folds.C_cusp[1] == pytest.approx(0.0141650, rel=1e-5)
+    assert 6.5 < folds.appears[2] < folds.ends[2] < 7.1
+
+
+def test_where_there_is_none():
+    folds = solve_drag_folds([1.5, 3.0], 0.0, 0.05, 1)
+    assert folds.status[0] == status.NO_TRANSITION
+    assert np.isnan(folds.appears[0])
+    # A short cable's fold leaves to infinite speed instead of turning at a cusp.
+    assert folds.status_cusp[1] == status.NO_CUSP
+    assert folds.status[1] == status.OK
+    with pytest.raises(ValueError, match="C must be finite and not negative"):
+        solve_drag_folds(5, 1, -1)
+    with pytest.raises(ValueError, match="whole number from 1"):
+        solve_drag_folds(5, 1, 1, 0)
+
+
+def test_lookup_within_its_error(drag_file):
+    table = open_drag(drag_file[0])
+    rng = np.random.default_rng(3)
+    lam, w_f = rng.uniform(12, 14, 6), rng.uniform(0, 1, 6)
+    cusp = table.folds(lam, w_f, 0.0).C_cusp
+    c = cusp * np.array([0.01, 0.3, 0.78, 0.85, 0.95, 2.0])
+    found = table.folds(lam, w_f, c)
+    direct = solve_drag_folds(lam, w_f, c)
+    np.testing.assert_array_equal(found.status, direct.status)
+    assert found.status[-1] == status.NO_PAIR
+    np.testing.assert_allclose(found.C_cusp, direct.C_cusp, rtol=found.error_cusp[0])
+    # What C* is wrong by moves the place on the curve, which the error of gamma does not hold.
+    tolerance = found.error[0] + found.error_cusp[0]
+    np.testing.assert_allclose(found.appears, direct.appears, rtol=tolerance)
+    there = found.status_ends == status.OK
+    assert list(there) == [False, False, True, True, True, False]
+    np.testing.assert_allclose(found.ends[there], direct.ends[there], rtol=tolerance)
+    assert found.error[0] < 0.01
+
+
+def test_nothing_is_extrapolated(drag_file):
+    table = open_drag(drag_file[0])
+    for cable, message in (((15, 0, 0.01), "lam = 15"), ((13, 2, 0.01), "w_f = 2"), ((13, 0, 0.01, 2), "n = 2")):
+        with pytest.raises(ValueError, match=message):
+            table.folds(*cable)
+        assert table.folds(*cable, outside="nan").status == status.OUTSIDE
+    cusp = float(table.folds(13, 0.5, 0).C_cusp)
+    with pytest.raises(ValueError, match=r"closer to C\*_1"):
+        table.folds(13, 0.5, cusp)
+    solved = table.folds([15, 13], 0.0, 0.01, outside="solve")
+    assert (solved.status == status.OK).all()
+    assert solved.appears[0] == float(solve_drag_folds(15, 0, 0.01).appears)
+
+
+def test_the_same_bytes_for_any_number_of_threads(drag_file, tmp_path):
+    path, summary = drag_file
+    build_drag(tmp_path / "one.nc", grid=TINY, threads=1, progress=False)
+    assert (tmp_path / "one.nc").read_bytes() == path.read_bytes()
+    assert "method drag" in str(summary)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    (tmp_path / "bad.nc").write_bytes(data)
+    with pytest.raises(atlas.AtlasFileError, match="damaged"):
+        open_drag(tmp_path / "bad.nc")
+
+
+def test_a_grid_over_the_end_of_a_cusp_is_refused(tmp_path):
+    short = dataclasses.replace(TINY, lam_min=2.5, lam_max=4.0, series_lam=2, series_w_f=2)
+    with pytest.raises(ArithmeticError, match="no cusp"):
+        build_drag(tmp_path / "drag.nc", grid=short, progress=False)
+    assert not list(tmp_path.iterdir())
+
+
+def test_other_files_are_told_apart(atlas_path):
+    with pytest.raises(atlas.AtlasFileError, match="no folds with drag"):
+        open_drag(atlas_path)
+
+
+def test_plain_reader(drag_file):
+    import xarray
+
+    with xarray.open_dataset(drag_file[0]) as file:
+        at = file.sel(n=1, w_f=0, lam=12)
+        assert float(at.appears.sel(C=0)) == pytest.approx(float(atlas.solve_critical(12, 0).gamma), rel=1e-3)
+        assert np.isnan(at.appears.sel(C=0.1))
+        assert float(at.C_cusp) == pytest.approx(0.0324, rel=0.05)
+
+
+def test_shell(capsys, drag_file, tmp_path):
+    cable = "critical", "--lam", "13", "--wf", "0.5", "--drag-file", drag_file[0]
+    code, out, _ = run(capsys, *cable, "--C", "0.01", "--n", "1", "--json")
+    (row,) = json.loads(out)
+    assert (code, row["status"]) == (0, "computed")
+    code, out, _ = run(capsys, *cable, "--C", "0.01", "--n", "1", "--solve")
+    assert code == 0
+    assert f"{row['appears']:.3f}"[:4] in out
+    assert run(capsys, *cable, "--C", "0.01", "--n", "2")[0] == 3
+    code, _, err = run(capsys, *cable, "--C", "1", "--n", "1")
+    assert code == 4
+    assert "too much drag" in err
+    assert run(capsys, *cable, "--C", "-1")[0] == 2
+    code, _, err = run(capsys, "plot", "drag", "--out", tmp_path / "drag.svg")
+    assert code == 0
+    assert (tmp_path / "drag.svg").stat().st_size > 5000
