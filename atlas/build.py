@@ -71,6 +71,11 @@ def limited_threads(count: int | None) -> Iterator[None]:
         numba.set_num_threads(before)
 
 
+def progress_bar(total: int, unit: str, wanted: bool) -> tqdm:
+    """A bar on standard error; none where that is no terminal."""
+    return tqdm(total=total, unit=unit, disable=None if wanted else True, leave=False)
+
+
 def build_atlas(
     path: Path,
     method: str = "fold",
@@ -95,7 +100,7 @@ def build_atlas(
     threads : int, optional
         Threads to use; all by default. The file does not depend on it.
     progress : bool
-        Whether to show a progress bar on standard error.
+        Whether to show a progress bar on standard error, if that is a terminal.
 
     Returns
     -------
@@ -108,7 +113,10 @@ def build_atlas(
     grid = grid or Grid()
     scan = scan or (ScanSettings() if method == "fold" else WHOLE_SCAN)
     total = scan.size + (grid.size if method == "fold" else 0)
-    with limited_threads(threads), tqdm(total=total, unit="fold", disable=not progress, leave=False) as bar:
+    with (
+        limited_threads(threads),
+        tqdm(total=total, unit="fold", disable=None if progress else True, leave=False) as bar,
+    ):
         if method == "fold":
             root, groups, facts = _build_fold(grid, scan, bar)
         else:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from atlas.branches import shoot_lanes, solve_members
-from atlas.build import limited_threads, provenance
+from atlas.build import limited_threads, progress_bar, provenance
 from atlas.critical import solve_rows
 from atlas.dataset import equilibria_attributes, equilibrium_variable, variable, write_atlas
 from atlas.grids import EquilibriaGrid
@@ -73,7 +73,7 @@ def build_equilibria(
     threads : int, optional
         Threads to use; all by default. The file does not depend on it.
     progress : bool
-        Whether to show a progress bar on standard error.
+        Whether to show a progress bar on standard error, if that is a terminal.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def build_equilibria(
     grid = grid or EquilibriaGrid()
     between = _between(grid)
     total = grid.size + between.size
-    with limited_threads(threads), tqdm(total=total, unit="cable", disable=not progress, leave=False) as bar:
+    with limited_threads(threads), progress_bar(total, "cable", progress) as bar:
         critical, solved = _solve(grid, bar, "equilibria")
         critical_between, exact = _solve(between, bar, "checking")
         sheets = _one_sheet(grid, critical["gamma"], critical_between["gamma"])

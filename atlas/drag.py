@@ -179,7 +179,10 @@ def solve_drag_equilibria(system: System, gamma: float, vacuum_r_f: ArrayLike = 
         f"derivative, refined until each predicts its neighbours within {PREDICTED:g} tow radii"
     )
     if np.size(vacuum_r_f):
-        searched += f"; {len(continued)} of {np.size(vacuum_r_f)} vacuum equilibria continued, {len(missed)} new by it"
+        searched += (
+            f"; {len(continued)} of {np.size(vacuum_r_f)} vacuum equilibria lead here, "
+            f"{len(missed)} of them to what the shots had missed"
+        )
     return _collect(system, gamma, np.exp(roots), searched)
 
 

@@ -23,6 +23,7 @@ from kernels import status
 SCHEMA_VERSION = 1
 INTERPOLANT = "support/interpolant"  # the group of the series
 EPS = np.finfo(float).eps
+MOST_SLACK = 1e-6
 ROUNDINGS = 48.0  # as in kernels.extract, whose import would bring numba (test_error_constants_agree)
 
 QUANTITIES = ("gamma", "R_x0", "x_f", "z_f", "tension", "error", "status")
@@ -184,7 +185,8 @@ class Atlas:
             excess = unchecked_excess_length(lam, w_f, n)
             sound = np.isfinite(lam) & np.isfinite(w_f) & (lam > 0.0) & (w_f >= 0.0)
             absent = sound & (excess <= 0.0)
-            slack = 4.0 * EPS * (1.0 + np.abs(lam / excess))
+            # Capped: next to the threshold rounding is all there is of the excess, and would let anything pass.
+            slack = np.minimum(4.0 * EPS * (1.0 + np.abs(lam / excess)), MOST_SLACK)
             inside = sound & ~absent & self.axes.holds(excess, w_f, slack) & (n <= self.n_max)
         codes = np.full(len(n), status.OUTSIDE, np.int8)
         codes[~sound] = status.BAD_INPUT

@@ -24,6 +24,8 @@ CLOSE = 0.01
 FINEST = 1e-6  # shortest interval in log a
 # Shots are followed beyond the longest cable, so that none of its equilibria hides at the end of the search.
 MARGIN = 1.5
+# Half waves on the longest shot beyond which a search, of thousands of such shots, is refused: some twenty seconds.
+HALF_WAVES = 500.0
 ROUNDS = 200
 
 Array = NDArray[np.float64]
@@ -76,7 +78,7 @@ def cables_to_depth(w_f: float, gamma: float, z_f: float, lam_max: float) -> Pla
     ValueError
         For numbers out of range, and what is not one number.
     ArithmeticError
-        If a shot overflows or the search does not converge.
+        If a shot overflows, the search does not converge, or would take minutes (HALF_WAVES).
 
     Notes
     -----
@@ -139,6 +141,11 @@ class _Search:
         self.longest = MARGIN * self.gamma2 * lam_max
         highest, codes = extrema(np.array([w_f]), np.array([MARGIN * lam_max]), np.array([gamma]), shoot_singly)
         _check(codes)
+        if highest[0] > HALF_WAVES:
+            raise ArithmeticError(
+                f"cables up to {lam_max:g} tow radii long would have shapes of up to {highest[0] / MARGIN:.0f} nodes "
+                "at this speed, too many to search; name a shorter longest cable (--max-length)"
+            )
         self.shoot: Shoot = shoot_singly if highest[0] <= FEW else shoot_lanes
 
     def ends(self) -> tuple[float, float]:

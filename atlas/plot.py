@@ -141,10 +141,10 @@ def plot_shape(curve: "xarray.Dataset", ax: Axes | None = None) -> LineCollectio
     ax.add_collection(cable)
     ax.plot(x[0], z[0], marker="v", color="k", markersize=8, linestyle="none", label="tow point", zorder=4)
     fish = "fish" if curve.attrs["w_f"] > 0 else "end of the cable"
-    ax.plot(x[-1], z[-1], marker="o", color="k", markersize=7, linestyle="none", label=fish, zorder=4)
+    ax.plot(x[-1], z[-1], marker="o", color="k", markersize=10, linestyle="none", label=fish, zorder=4)
     if curve.attrs["nodes"]:
         nodes = curve.z_node.values
-        style: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": "k", "markersize": 6, "linestyle": "none"}
+        style: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": "k", "markersize": 5, "linestyle": "none"}
         # Above the fish, which hides a node next to it.
         ax.plot(0.0 * nodes, nodes, label="node", zorder=5, **style)
     low, high = min(0.0, x.min()), max(0.0, x.max())

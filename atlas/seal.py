@@ -60,7 +60,9 @@ def read_sealed(path: Path) -> tuple[bytes, str]:
     try:
         data = path.read_bytes()
     except FileNotFoundError:
-        raise FileNotFoundError(f"no atlas at {path}; build one with `make atlas` or `towatlas build`") from None
+        raise FileNotFoundError(
+            f"no file at {path}; `towatlas build` makes an atlas, `towatlas build --help` says what else there is"
+        ) from None
     except OSError as error:
         raise AtlasFileError(f"{path} cannot be read: {error.strerror}") from None
     if not data:

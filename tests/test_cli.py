@@ -109,7 +109,7 @@ def test_files_that_cannot_be_read(capsys, tmp_path, atlas_path):
     ):
         code, out, err = run(capsys, *arguments, tmp_path / "absent.nc")
         assert (code, out) == (5, "")
-        assert "no atlas at" in err
+        assert "no file at" in err
         damaged = tmp_path / "damaged.nc"
         damaged.write_bytes(atlas_path.read_bytes()[:-1000])
         code, out, err = run(capsys, *arguments, damaged)

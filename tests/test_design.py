@@ -207,3 +207,8 @@ def test_cables_without_transitions(ask):
     assert row["nearest_n"] is None
     code, out, _ = ask("--depth", "1 cm", "--max-length", "1.2 cm", "--gamma", 0.1)
     assert out.splitlines()[-1].split()[-2:] == ["-", "median"]
+
+
+def test_a_search_of_minutes_is_refused():
+    with pytest.raises(ArithmeticError, match="too many to search.*--max-length"):
+        cables_to_depth(1352, 2.97, 28_600, 286_000)

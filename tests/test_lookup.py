@@ -194,3 +194,18 @@ def test_lookup_imports_nothing_heavy(atlas_path):
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_nothing_within_rounding_of_the_threshold(atlas_file):
+    """A few ulp beyond lambda_cn the excess length is all rounding: outside the atlas, however the ends are rounded."""
+    rng = np.random.default_rng(8)
+    n, w_f = rng.integers(1, 7, 300), 10.0 ** rng.uniform(-3, 3, 300)
+    lam = atlas.threshold_length(w_f, n)
+    for _ in range(12):
+        lam = np.nextafter(lam, np.inf)
+        states = atlas_file.states(lam, w_f, n, outside="nan")
+        assert set(states.status) <= {status.OUTSIDE, status.NO_TRANSITION}
+        assert np.isnan(states.gamma).all()
+    with pytest.raises(ValueError, match="outside the atlas"):
+        atlas_file.critical_speed(lam, w_f, n)
+    assert (atlas_file.states(lam, w_f, n, outside="solve").status == status.LOST_IN_ROUNDING).all()
