@@ -150,7 +150,9 @@ def test_overflow_is_said():
 
 @pytest.fixture
 def ask(capsys, atlas_path):
-    return lambda *arguments: run(capsys, "design", "--scene", "skop-fig3", "--atlas", atlas_path, *arguments)
+    return lambda *arguments: run(
+        capsys, "design", "--scene", "skop-fig3", "--model", "vacuum", "--atlas", atlas_path, *arguments
+    )
 
 
 def test_shell(ask):
