@@ -14,10 +14,12 @@ from test_scene import changed
 
 import atlas
 from atlas.answers import answer_scene
+from atlas.commands.scene import text_of
 from atlas.drag_shots import System
 from atlas.model_folds import ModelFolds, follow_folds, model_folds
 from atlas.models import QUESTIONS, check_questions, choose, compare, least_model, solvable_models, solve_model
 from atlas.scene import make_scene, read_scene
+from benchmarks import models
 
 FIGURES = {(37.8, 1352): "skop-fig3", (52.4, 1352): "skop-fig4", (52.4, 1571): "skop-fig5"}
 HANGS = ("nodes", "position", "tension")
@@ -62,6 +64,13 @@ def test_a_fold_that_drag_takes_away():
     assert answer.equilibria is answer.choice.answer.equilibria
     assert answer.equilibria.C == scene.groups("air").C
     assert answer_scene(scene, asked=HANGS).choice.model == "vacuum"
+    text = text_of(answer)
+    lines = text.splitlines()
+    assert sum(line.startswith("vacuum  air ") and line.endswith("disagrees") for line in lines) == 1
+    (row,) = (line.split() for line in lines if line.split()[:3] == ["2", "never", "never"])
+    assert float(row[3]) == pytest.approx(0.018, abs=1e-4)
+    assert float(row[4]) < float(row[3])
+    assert text.count("near axis") == 1
 
 
 def test_buoyancy_without_drag():
@@ -203,17 +212,6 @@ def test_shell(capsys, tmp_path):
     assert "asked must be some of" in err
 
 
-def test_tables_for_people(capsys, tmp_path):
-    code, out, _ = run(capsys, "scene", "skop-fig3", "--gamma", 1.64, "--atlas", tmp_path / "none.nc")
-    assert code == 0
-    lines = out.splitlines()
-    assert sum(line.startswith("vacuum  air ") and line.endswith("disagrees") for line in lines) == 1
-    (row,) = (line.split() for line in lines if line.split()[:3] == ["2", "never", "never"])
-    assert float(row[3]) == pytest.approx(0.018, abs=1e-4)
-    assert float(row[4]) < float(row[3])
-    assert out.count("near axis") == 1
-
-
 def test_design_says_where_the_vacuum_fails(capsys, tmp_path):
     (tmp_path / "wet.toml").write_text(PAGE_SCENE)
     arguments = ("design", "--scene", tmp_path / "wet.toml", "--depth", "120 m", "--atlas", tmp_path / "none.nc")
@@ -239,3 +237,24 @@ def test_questions_are_named_in_help(capsys):
     out = run(capsys, "scene", "--help")[1]
     for question in QUESTIONS:
         assert question in out
+
+
+def test_benchmark(tmp_path):
+    found = models.measure([("skop-fig5", 2.6, 2)])
+    table = models.systems_table(found)
+    assert "| skop-fig5 | 2.6 | 2 | **1**, 2, 2 | 11 %, 26 % |" in table
+    assert table.splitlines()[-1].endswith("| air | air | air | air | air |")
+    assert models.models_table(found).splitlines()[2].startswith("| vacuum | 0 of 1 | 11 %, 26 % |")
+    models.write_csv(found, tmp_path / "models.csv")
+    lines = (tmp_path / "models.csv").read_text().splitlines()
+    assert len(lines) == 4
+    models.draw(found, [tmp_path / "models.svg"])
+    assert (tmp_path / "models.svg").stat().st_size > 5000
+    marks = "<!-- models: written by python -m benchmarks.models -->\nold<!-- end of models -->"
+    assert models.put(marks, "models", "new\n") == marks.replace("old", "new\n")
+
+
+def test_page_says_what_is_chosen():
+    rows = [line.split(" | ") for line in PAGE.splitlines() if line.startswith("| skop-fig")]
+    assert ["".join(row[k].strip(" |")[0] for row in rows) for k in (6, 7, 8)] == ["vvvvaavv", "vavvaaav", "vvvvaavv"]
+    assert {row[k].strip(" |") for row in rows for k in (9, 10)} == {"air"}

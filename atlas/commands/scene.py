@@ -107,7 +107,7 @@ def _run(options: argparse.Namespace) -> int:
         options.asked,
         lambda: announce_compilation("shoot_drag", 10),
     )
-    print(json.dumps(_object(answer), indent=1) if options.json else _text(answer))
+    print(json.dumps(_object(answer), indent=1) if options.json else text_of(answer))
     for code in {int(code) for code in answer.jumps.status} - {status.OK}:
         say(f"a critical speed could not be had: {status.SENTENCES[code]}")
     return OK
@@ -249,7 +249,8 @@ def describe_speed(scene: Scene) -> str:
     )
 
 
-def _text(answer: SceneAnswer) -> str:
+def text_of(answer: SceneAnswer) -> str:
+    """Everything about a scene, for people."""
     scene = answer.scene
     by_model = {model: _groups(scene, model) for model in MODELS}
     lines = [scene.title or scene.source, describe_speed(scene), f"towed in {MEDIA[scene.medium]}", ""]
