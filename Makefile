@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 ATLAS := build/atlas.nc
 
 .DEFAULT_GOAL := help
-.PHONY: help install atlas equilibria test bench failures check figures clean
+.PHONY: help install atlas equilibria drag test bench failures check figures clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
@@ -24,10 +24,14 @@ atlas: install  ## build build/atlas.nc
 equilibria: install  ## build build/equilibria.nc, the table of fish positions
 	$(BIN)/python -m atlas build --equilibria
 
+drag: install  ## build build/drag.nc, the table of folds with drag; some minutes
+	$(BIN)/python -m atlas build --drag
+
 test: install  ## run the tests
 	$(BIN)/python -m pytest
 
-bench: install  ## measure error and time, print the tables, update the one in the README
+bench: install  ## chart error against time, compare the ratios, update docs and README
+	-$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[peers]'
 	$(BIN)/python -m benchmarks
 
 failures: install  ## map where methods fail, write the figure and the tables of docs/failures.md
@@ -39,10 +43,11 @@ check: install  ## ruff, types, import layers
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-figures: install  ## draw the figures of the README from build/atlas.nc
+figures: install  ## draw the figures of the README from build/atlas.nc, and of NRL Report 7048 (build/report.html)
 	@test -f $(ATLAS) || $(MAKE) --no-print-directory atlas
 	$(BIN)/python -m atlas plot critical --atlas $(ATLAS) --out docs/critical.svg
 	$(BIN)/python -m atlas plot critical --atlas $(ATLAS) --out docs/critical.png
+	$(BIN)/python -m atlas report --out build/report.html
 
 clean:  ## remove .venv, build and caches
 	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache

@@ -23,7 +23,7 @@ from kernels import status
 Array = NDArray[np.float64]
 
 # Curves traced together: enough for all threads, few enough for the bar to move.
-BATCH = 32
+BATCH = 40
 # The error of a series is taken as this many times the worst found at points between its nodes.
 MARGIN = 3.0
 
@@ -37,16 +37,16 @@ class DragGrid:
     """Where folds with drag are tabulated. The defaults take a few minutes."""
 
     n_max: int = 3
-    lam_min: float = 12.0
+    lam_min: float = 16.0
     lam_max: float = 60.0
     w_f_max: float = 2000.0
     sigma_min: float = -0.5
-    series_lam: int = 9
-    series_w_f: int = 14
-    series_sigma: int = 14
-    checks: int = 16
+    series_lam: int = 5
+    series_w_f: int = 8
+    series_sigma: int = 10
+    checks: int = 6
     w_f: Array = field(default_factory=lambda: np.concatenate([[0.0], 10.0 ** np.linspace(-1.0, 3.25, 18)]))
-    lam: Array = field(default_factory=lambda: np.geomspace(12.0, 60.0, 15))
+    lam: Array = field(default_factory=lambda: np.geomspace(16.0, 60.0, 14))
     C: Array = field(default_factory=_c_grid)
 
     @property

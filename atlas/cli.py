@@ -8,12 +8,12 @@ import argparse
 import sys
 
 from atlas import __version__
-from atlas.commands import build, critical, design, equilibria, fish, info, plot, scene, shape
+from atlas.commands import build, critical, design, equilibria, fish, info, plot, report, scene, shape
 from atlas.commands.common import FAILED, FILE, OK, USAGE, say
 from atlas.seal import AtlasFileError
 
 # In the order in which help lists them.
-COMMANDS = (critical, equilibria, shape, fish, scene, design, build, plot, info)
+COMMANDS = (critical, equilibria, shape, fish, scene, design, build, plot, report, info)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -233,12 +233,16 @@ class Atlas:
         for name in table.keys() & values.keys():
             table[name][inside] = values[name]
 
+    def series(self, name: str, n: int) -> Array:
+        """Chebyshev coefficients, shape (w_f degree, excess degree), of one quantity; see `atlas.interpolant`."""
+        return self._series[name][n - 1]
+
     def _patches_of(self, name: str, n: NDArray[np.int64]) -> dict[int, Array]:
         """Patches of a field, made for each n when first asked for; two threads at once make the same."""
         made = self._patches[name]
         for order in range(int(n.min()), int(n.max()) + 1):
             if order not in made:
-                made[order] = interpolant.patches(self._series[name][order - 1])
+                made[order] = interpolant.patches(self.series(name, order))
         return made
 
     def _complaint(self, n: NDArray[np.int64], w_f: Array, lam: Array, bad: NDArray[np.bool_]) -> str:

@@ -17,7 +17,8 @@ class Symbol:
     @property
     def axis(self) -> str:
         """Label for a plot axis: the words up to the formula, then the symbol."""
-        return f"{self.long_name.split(', ')[0]}  {self.tex}"
+        words = self.long_name.split(", ")[0].replace("(mu + rho A) g R", r"$(\mu + \rho A)\, g R$")
+        return f"{words}  {self.tex}"
 
 
 _AT_FOLD = ", at the critical speed"
@@ -72,6 +73,13 @@ SYMBOLS = {symbol.name: symbol for symbol in _TABLE}
 
 _ONE_STATE = (
     Symbol("gamma", "speed, gamma = Omega sqrt(R/g)", r"$\gamma = \Omega\sqrt{R/g}$", f"{REPORT}, Eq. (13b)"),
+    replace(SYMBOLS["R_x0"], long_name=SYMBOLS["R_x0"].long_name.removesuffix(_AT_FOLD), tex="$R_{x0}$"),
+    Symbol(
+        "boundary_error",
+        "boundary error at the fish over (mu + rho A) g R, of a forward shot",
+        r"$E(\lambda)$",
+        f"{REPORT}, Eq. (33)",
+    ),
     Symbol("nodes", "number of nodes, points of the cable on the axis", "", REPORT),
     Symbol("count", "number of equilibria", "", REPORT),
     Symbol("error", "estimated relative error of x_f", r"$\epsilon$", "towatlas"),

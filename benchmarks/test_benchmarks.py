@@ -1,25 +1,147 @@
 """The benchmarks, run once with small sizes so that they cannot rot. No test asserts a time."""
 
+import csv
+import json
+
+import numpy as np
 import pytest
 
-from benchmarks import measure
+from benchmarks import figures, folds, lookup, methods_shots, peers_folds, report, samples, shots, targets
+from benchmarks.timing import LOST, Row
 
 
 @pytest.fixture(scope="module")
 def table(tmp_path_factory):
-    return measure.open_or_build(tmp_path_factory.mktemp("bench") / "atlas.nc")
+    return lookup.open_or_build(tmp_path_factory.mktemp("bench") / "atlas.nc")
 
 
-def test_lookup_errors(table):
-    worst = measure.lookup_errors(table, 3000)
-    assert worst.pop("error estimates that hold")[0] == 1.0
-    for name, (value, where) in worst.items():
-        assert value < 1e-8, (name, where)
+@pytest.fixture(scope="module")
+def shot_rows():
+    return {(row.method, row.setting): row for row in shots.measure(rows=48, slow_rows=4, full=False)}
 
 
-def test_methods(table):
-    rows = {row.method.split(",")[0]: row for row in measure.methods(table, rows=200, peer_rows=3)}
-    assert rows["lookup from the atlas"].error < 1e-8
-    assert rows["direct solution"].error < 1e-12
-    assert rows["Skop's scan"].error < 1e-2
-    assert rows["SciPy `solve_ivp` + `root`"].error < 1e-6
+def test_the_files_hold_what_they_say():
+    """Samples are drawn anew, three answers of each file computed anew."""
+    exact = samples.shot_reference()
+    a, mu, tau = samples.shots(samples.SHOTS)
+    np.testing.assert_allclose(exact.tau, tau, rtol=1e-9)
+    np.testing.assert_allclose(exact.a, a, rtol=1e-9)
+    np.testing.assert_allclose(exact.mu, mu, rtol=1e-9)
+    short = np.argsort(exact.tau / np.hypot(1.0, exact.a))[:3]
+    for i, row in zip(short, samples.exact_shots(exact.a[short], exact.mu[short], exact.tau[short]), strict=True):
+        assert exact.p[0][i] == float(row["p"])
+        assert exact.q[0][i] == float(row["q"])
+    critical = samples.fold_reference()
+    n, w_f, lam = samples.cables(samples.FOLDS)
+    for ours, drawn in ((critical.n, n), (critical.w_f, w_f), (critical.lam, lam)):
+        np.testing.assert_allclose(ours, drawn, rtol=1e-12)
+    row = samples.exact_folds(n[:1], w_f[:1], lam[:1])[0]
+    assert critical.gamma[0][0] == float(row["gamma"])
+
+
+def test_every_method_converges_to_the_reference(shot_rows):
+    """Each method, at its most accurate small setting, in the median; what it should be, not what it was."""
+    bounds = {
+        ("Taylor, this project", "order 20"): 1e-14,
+        ("Taylor, other orders", "order 12"): 1e-14,
+        ("order 8, adaptive", "rtol 1e-07"): 1e-6,
+        ("SciPy DOP853", "rtol 1e-07"): 1e-5,
+        ("SciPy LSODA", "rtol 1e-07"): 1e-4,
+        ("RK4 forward (Skop)", "N = 100"): 1e-2,
+        ("RK4 fish-up in t", "N = 100"): 1e-2,
+        ("RK4 fish-up in sqrt(t)", "N = 100"): 1e-2,
+        ("RK4 fish-up in sigma", "N = 100"): 1e-2,
+    }
+    for key, bound in bounds.items():
+        assert shot_rows[key].quantile("p", 0.5) < bound, key
+
+
+@pytest.mark.parametrize(("variable", "order"), [("t", 4), ("sqrt(t)", 4), ("sigma", 4)])
+def test_runge_kutta_has_its_order(variable, order):
+    shot = np.array([0.5]), np.array([2.0]), np.array([30.0])
+    length = methods_shots.lengths(*shot)
+    exact = methods_shots.march(*shot)[0][0]
+    miss = [abs(methods_shots.rk4_fish_up(variable, *shot, length, n)[0][0] - exact) for n in (400, 800, 1600)]
+    assert np.log2(miss[1] / miss[2]) == pytest.approx(order, abs=0.4)
+
+
+def test_order_8_has_its_order():
+    shot = np.array([0.5]), np.array([2.0]), np.array([30.0])
+    exact = methods_shots.march(*shot)[0][0]
+    miss = [abs(methods_shots.order_8(*shot, segments=n)[0][0] - exact) for n in (8, 16)]
+    assert np.log2(miss[0] / miss[1]) > 7.0
+
+
+def test_folds(table):
+    rows = {row.method: row for row in folds.measure(table, rows=40, slow_rows=3, full=False)}
+    assert rows["direct, table"].quantile("gamma", 1.0) < 1e-11
+    assert rows["direct, one by one"].quantile("gamma", 1.0) < 1e-11
+    assert rows["lookup from the atlas"].quantile("gamma", 1.0) < 1e-10
+    assert rows["Skop's scan"].failures.endswith("of 3")
+
+
+def test_peers_find_the_fold():
+    """Where nothing is difficult, the SciPy methods are right."""
+    assert peers_folds.by_root(1, 1.0, 10.0, rtol=1e-10) == pytest.approx(0.466173258416, rel=1e-8)
+    near = np.log([0.95, 0.465])
+    curve = peers_folds.bvp_curve(1, 1.0, np.array([10.0, 10.1]), near, tolerance=1e-6)
+    assert curve[0] == pytest.approx(0.466173258416, rel=1e-6)
+
+
+def test_lookup(table):
+    rows, construct = lookup.measure(table, points=2000)
+    worst = {row.method: row.quantile("gamma", 1.0) for row in rows}
+    assert worst["this project"] < 1e-10
+    assert worst["RegularGridInterpolator cubic"] < worst["RegularGridInterpolator linear"] < LOST
+    assert worst["xarray.interp linear"] == pytest.approx(worst["RegularGridInterpolator linear"], rel=1e-6)
+    assert set(construct) == set(worst) - {"this project"}
+    errors = lookup.whole_domain(table, 2000)
+    assert errors.pop("error estimates that hold") == 1.0
+    assert max(errors.values()) < 1e-8
+
+
+def test_figures_and_tables(shot_rows, tmp_path, monkeypatch):
+    rows = list(shot_rows.values())
+    figures.shots(rows, tmp_path / "shots")
+    assert {path.suffix for path in tmp_path.iterdir()} == {".svg", ".png"}
+    monkeypatch.setattr(report, "DATA", tmp_path)
+    report.chart_csv("shots", rows, shots.REFERENCE_METHOD)
+    with (tmp_path / "shots.csv").open() as file:
+        lines = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    assert len(lines) == len(rows)
+    assert float(lines[0]["ratio"]) == 1.0
+    table = report.chart_table(rows, shots.REFERENCE_METHOD, ["p", "q"]).splitlines()
+    assert len(table) == 2 + len(rows)
+    assert len({line.count("|") for line in table}) == 1
+    document = tmp_path / "page.md"
+    document.write_text("a\n<!-- x: written by make bench -->\nold\n<!-- end of x -->\nb\n")
+    report.put(document, "x", "new\n")
+    assert document.read_text() == "a\n<!-- x: written by make bench -->\nnew\n<!-- end of x -->\nb\n"
+
+
+def test_lost_answers_are_counted_and_not_averaged():
+    errors = np.array([1e-9, 1e-9, np.nan, 0.5])
+    row = Row("m", "s", 4, {"p": errors}, 1.0)
+    assert row.failure_rate == 0.5
+    assert row.quantile("p", 0.5) == 1e-9
+    assert row.columns(2.0)["ratio"] == "0.5"
+
+
+def test_guard_names_what_got_worse(tmp_path, monkeypatch):
+    path = tmp_path / "ratios.json"
+    kept = [targets.Target("a", 10.0, 9.0), targets.Target("b", 10.0, None)]
+    assert "no committed ratios" in targets.compare(kept, path)[0]
+    targets.keep(kept, path)
+    assert json.loads(path.read_text())["ratios"] == {"a": 10.0, "b": 10.0}
+    assert "no ratio is worse" in targets.compare([targets.Target("a", 8.6, 9.0), kept[1]], path)[0]
+    verdict = targets.compare([targets.Target("a", 8.4, 9.0)], path)
+    assert verdict[0].startswith("WORSE: a")
+    assert verdict[1] == "not measured: b"
+    monkeypatch.setattr(targets, "processor", lambda: "another")
+    assert targets.compare(kept, path)[0].startswith("not compared")
+
+
+def test_targets_say_whether_they_are_reached():
+    verdicts = [targets.Target("a", value, wanted).verdict for value, wanted in ((2.0, 1.0), (0.5, 1.0), (2.0, None))]
+    assert verdicts == ["reached", "not reached", "watched"]
+    assert all(target.value > 0.0 for target in targets.of_forward_shots(rows=64, segments=10))

@@ -17,7 +17,6 @@ from kernels.shots import march
 SHOTS_BLOCK = 256
 FOLDS_BLOCK = 128
 FORWARD_BLOCK = 1024
-DRAG_BLOCK = 16
 
 
 def _march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts, statuses):
@@ -63,12 +62,10 @@ def _scan_systems(w_f, lam, gamma_low, gamma_high, speeds, guesses, segments, n_
 
 def _shoot_drag(r, gamma2, systems, shares, jets, places, degree, max_steps, results, steps, statuses):
     none = np.empty((0, STATE - 1))
-    rows = len(r)
-    for block in numba.prange((rows + DRAG_BLOCK - 1) // DRAG_BLOCK):
-        begin = block * DRAG_BLOCK
-        stop = min(rows, begin + DRAG_BLOCK)
+    # A shot takes milliseconds: one a block.
+    for row in numba.prange(len(r)):
         shoot_drag(
-            r, gamma2, systems, shares, jets, places, degree, max_steps, none, results, steps, statuses, begin, stop
+            r, gamma2, systems, shares, jets, places, degree, max_steps, none, results, steps, statuses, row, row + 1
         )
 
 

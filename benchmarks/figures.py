@@ -1,0 +1,158 @@
+"""The three charts: error against time, both logarithmic, failures marked."""
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from benchmarks.timing import LOST, Row
+
+FLOOR = 1e-17
+OURS = "#c1121f"
+# One colour and marker a method, the same in every panel; relatives share a hue.
+STYLES = {
+    "Taylor, this project": (OURS, "*"),
+    "Taylor, other orders": ("#f08080", "o"),
+    "RK4 forward (Skop)": ("black", "v"),
+    "RK4 fish-up in t": ("#0b3c8c", "s"),
+    "RK4 fish-up in sqrt(t)": ("#2f7ed8", "D"),
+    "RK4 fish-up in sigma": ("#74b3f0", "^"),
+    "order 8, fixed": ("#b08968", "P"),
+    "order 8, adaptive": ("#6f4518", "X"),
+    "SciPy DOP853": ("#e07a00", ">"),
+    "SciPy LSODA": ("#f4b942", "<"),
+    "CyRK DOP853": ("#d81b60", "p"),
+    "heyoka in t, scalar": ("#8fd19e", "h"),
+    "heyoka in t, batch of 8": ("#1b7f3b", "H"),
+    "heyoka in sigma, scalar": ("#b9a0dc", "h"),
+    "heyoka in sigma, scalar, event": ("#c77dff", "d"),
+    "heyoka in sigma, batch of 8": ("#5e3c99", "H"),
+    "direct, table": (OURS, "*"),
+    "direct, one by one": (OURS, "*"),
+    "lookup from the atlas": (OURS, "*"),
+    "Skop's scan": ("black", "v"),
+    "SciPy solve_ivp + root": ("#1b7f3b", "s"),
+    "SciPy solve_bvp": ("#e07a00", "D"),
+    "this project": (OURS, "*"),
+    "RegularGridInterpolator linear": ("#2f7ed8", "s"),
+    "RegularGridInterpolator cubic": ("#0b3c8c", "D"),
+    "RectBivariateSpline": ("#1b7f3b", "^"),
+    "xarray.interp linear": ("#e07a00", "v"),
+}
+plt.rcParams |= {"svg.hashsalt": "towatlas", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
+
+
+def _lines(rows: list[Row]) -> dict[str, list[Row]]:
+    lines: dict[str, list[Row]] = {}
+    for row in rows:
+        lines.setdefault(row.method, []).append(row)
+    return lines
+
+
+def panel(axes: Axes, rows: list[Row], name: str) -> None:
+    """Errors against time, one line a method through its 99th percentiles in the order of its settings."""
+    for method, line in _lines([row for row in rows if name in row.errors]).items():
+        colour, marker = STYLES[method]
+        mine = marker == "*"
+        time = np.array([row.microseconds for row in line])
+        median, high, worst = (
+            np.maximum([row.quantile(name, share) for row in line], FLOOR) for share in (0.5, 0.99, 1.0)
+        )
+        size = 12 if mine else 5.5
+        style = {"color": colour, "zorder": 5 if mine else 2}
+        axes.plot(time, high, "-", lw=1.2, marker=marker, ms=size, label=method, mec="white", mew=0.5, **style)
+        axes.vlines(time, median, worst, lw=0.8, alpha=0.6, **style)
+        axes.plot(time, median, "_", ms=7, **style)
+        lost = np.array([row.failure_rate > 0.0 for row in line])
+        axes.plot(time[lost], high[lost], "o", ms=size + 6, mfc="none", mec="black", mew=0.9, zorder=6)
+    axes.set(xscale="log", yscale="log")
+    axes.axhspan(LOST, 1e30, color="0.93", zorder=0, lw=0)
+    axes.grid(True, which="major", lw=0.4, color="0.85")
+    axes.set_axisbelow(True)
+
+
+def _finish(figure: Figure, path: Path) -> None:
+    for suffix, extra in ((".svg", {"metadata": {"Date": None}}), (".png", {"dpi": 130})):
+        figure.savefig(path.with_suffix(suffix), bbox_inches="tight", **extra)  # type: ignore[arg-type]
+    plt.close(figure)
+
+
+KEY = (
+    "Symbol: 99th percentile; bar: median to largest. Ringed: some answers lost, "
+    f"none or off by more than {LOST:g} (grey). Below and left is better."
+)
+
+
+def shots(rows: list[Row], path: Path) -> None:
+    """First chart."""
+    figure, both = plt.subplots(1, 2, figsize=(12.5, 6.2), sharey=True, sharex=True)
+    for axes, name, title in zip(
+        both, ("p", "q"), ("Error of the offset p", "Error of its derivative q = dp/da"), strict=True
+    ):
+        panel(axes, rows, name)
+        axes.set_title(title, loc="left")
+        axes.set_xlabel("time per shot, with derivative [us], one thread")
+    both[0].set_ylim(FLOOR * 3, 1e4)
+    both[0].set_ylabel("error over the local amplitude [-]")
+    handles, labels = both[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="center left", bbox_to_anchor=(0.91, 0.5), frameon=False)
+    figure.text(0.125, 0.0, KEY + " RK4 forward has no derivative.", fontsize=8.5)
+    _finish(figure, path)
+
+
+def folds(rows: list[Row], path: Path) -> None:
+    """Second chart."""
+    figure, axes = plt.subplots(figsize=(8.5, 5.6))
+    panel(axes, rows, "gamma")
+    axes.set(xlabel="time per critical speed [us], one thread", ylabel="relative error of gamma_cn [-]")
+    axes.set_ylim(FLOOR * 3, 1e2)
+    marks = {
+        "direct, table": ("direct,\ntable of 4000", (-6, 9), "center"),
+        "direct, one by one": ("direct,\none a call", (6, 9), "center"),
+        "lookup from the atlas": ("lookup\nfrom the atlas", (0, 9), "center"),
+    }
+    # Where the share of lost answers stands: beside the symbols of its method that the others leave free.
+    sides = {"Skop's scan": ((0, -19), "center"), "SciPy solve_bvp": ((-10, -3), "right")}
+    colours = {line.get_label(): line.get_color() for line in axes.get_lines()}
+    for row in rows:
+        place = (row.microseconds, max(row.quantile("gamma", 0.99), FLOOR))
+        if row.method in marks:
+            text, offset, side = marks[row.method]
+            axes.annotate(text, place, offset, textcoords="offset points", color=OURS, ha=side, fontsize=8.5)
+        elif row.failure_rate > 0.0:
+            offset, side = sides.get(row.method, ((10, -3), "left"))
+            text = f"{row.failure_rate:.0%} lost"
+            axes.annotate(
+                text, place, offset, textcoords="offset points", fontsize=8, ha=side, color=colours[row.method]
+            )
+    low, high = axes.get_xlim()
+    axes.set_xlim(low / 3.0, high * 3.0)
+    handles, labels = axes.get_legend_handles_labels()
+    kept = [(h, text) for h, text in zip(handles, labels, strict=True) if text not in marks]
+    axes.legend(*zip(*kept, strict=True), loc="lower right", frameon=False)
+    axes.set_title("Critical speeds from cold, over the whole domain of the atlas", loc="left")
+    figure.text(0.1, -0.02, KEY, fontsize=8)
+    _finish(figure, path)
+
+
+def lookup(rows: list[Row], path: Path) -> None:
+    """Third chart."""
+    figure, both = plt.subplots(1, 2, figsize=(12, 5), sharey=True)
+    for axes, one in zip(both, (False, True), strict=True):
+        part = [row for row in rows if (row.setting == "one point") == one]
+        panel(axes, part, "gamma")
+        axes.set_xlabel("time per point [us]")
+        axes.set_title("one point a call" if one else f"{part[0].setting} a call", loc="left")
+        low, high = (f([row.microseconds for row in part]) for f in (min, max))
+        axes.set_xlim(low / 2.5, high * 2.5)
+    both[0].set_ylim(FLOOR * 3, 1.0)
+    both[0].set_ylabel("relative error of gamma_c1 [-]")
+    handles, labels = both[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="center left", bbox_to_anchor=(0.91, 0.5), frameon=False)
+    figure.text(0.125, -0.03, KEY + " The same 96 x 112 nodes for all.", fontsize=8.5)
+    _finish(figure, path)
