@@ -1,6 +1,7 @@
 """The least model: what each question needs on the report's systems, and what breaks each comparison."""
 
 import json
+import sys
 import tomllib
 from dataclasses import replace
 from math import inf, nan
@@ -8,16 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import reference_drag
 from test_cli import run
-from test_drag import PHOTOGRAPHS, reference_shot
+from test_drag import PHOTOGRAPHS
 from test_scene import changed
 
 import atlas
 from atlas.answers import answer_scene
+from atlas.branches import shoot_lanes
+from atlas.commands.common import announce_lanes
 from atlas.commands.scene import text_of
 from atlas.drag_shots import System
 from atlas.model_folds import ModelFolds, follow_folds, model_folds
 from atlas.models import QUESTIONS, check_questions, choose, compare, least_model, solvable_models, solve_model
+from atlas.placement import cables_to_depth, needs_lanes
 from atlas.scene import make_scene, read_scene
 from benchmarks import models
 
@@ -153,13 +158,14 @@ def test_a_cable_that_floats_without_a_fish():
 
 
 def test_far_beyond_the_drag_of_the_report():
-    """The scene of the page, C = 559: DOP853 from the fish it finds comes to the tow point, with its tension."""
+    """The scene of the page, C = 559: a long-double shot from its fish comes to the tow point, with its tension."""
     scene = make_scene(tomllib.loads(PAGE_SCENE))
     answer = solve_model(scene, "water")
     groups = answer.groups
     assert groups.C > 500
     system = System(groups.lam, groups.w_f, groups.m_f, groups.C, groups.C_f, groups.w)
-    x, y, z, *force = reference_shot(np.hypot(*answer.position[:2]) / scene.radius, groups.gamma, system)
+    end = reference_drag.shot(np.hypot(*answer.position[:2]) / scene.radius, groups.gamma, system)
+    x, y, z, *force = np.asarray(end, float)
     assert np.hypot(x, y) == pytest.approx(1.0, abs=1e-10)
     assert -z * scene.radius == pytest.approx(answer.position[2], rel=1e-10)
     assert np.linalg.norm(force) * scene.force_unit("water") == pytest.approx(answer.tension, rel=1e-10)
@@ -258,3 +264,24 @@ def test_page_says_what_is_chosen():
     rows = [line.split(" | ") for line in PAGE.splitlines() if line.startswith("| skop-fig")]
     assert ["".join(row[k].strip(" |")[0] for row in rows) for k in (6, 7, 8)] == ["vvvvaavv", "vavvaaav", "vvvvaavv"]
     assert {row[k].strip(" |") for row in rows for k in (9, 10)} == {"air"}
+
+
+@pytest.mark.parametrize(("gamma", "many"), [(1.0, False), (10.0, True)])
+def test_the_kernel_of_many_lanes_is_announced_where_it_is_used(monkeypatch, gamma, many):
+    cable = 300.0, 0.0, gamma
+    used, said = [], []
+
+    def lanes(*arguments):
+        used.append(1)
+        return shoot_lanes(*arguments)
+
+    # The function of the same name hides the module.
+    monkeypatch.setattr(sys.modules["atlas.equilibria"], "shoot_lanes", lanes)
+    monkeypatch.setattr("atlas.commands.common.announce_compilation", said.append)
+    announce_lanes(*cable)
+    atlas.equilibria(*cable)
+    assert (said, bool(used)) == (["march"] if many else [], many)
+    used.clear()
+    monkeypatch.setattr("atlas.placement.shoot_lanes", lanes)
+    cables_to_depth(0.0, gamma, 200.0, 300.0)
+    assert bool(used) == needs_lanes(0.0, gamma, 300.0) == many
