@@ -70,7 +70,7 @@ class Difference:
     def words(self) -> str:
         """The difference as a percentage, or the two values where it has none."""
         if isfinite(self.relative):
-            return f"{100 * self.relative:.2g} %"
+            return percent(self.relative)
         values = (self.by_smaller, self.by_larger)
         return ", ".join("none" if v == inf else "not known" if v != v else f"{v:.4g}" for v in values)
 
@@ -109,7 +109,7 @@ class Choice:
         if larger:
             parts.append(f"{self.model} agrees with {' and '.join(larger)} within {100 * self.tolerance:g} %")
             if (most := self.largest(self.model)) is not None:
-                parts[-1] += f", at most {100 * most.relative:.2g} % in the {most.quantity}"
+                parts[-1] += f", at most {percent(most.relative)} in the {most.quantity}"
         else:
             parts.append(f"{self.model} is the largest model that the scene has the keys for")
         parts += [f"{name} was not tried: it needs fish.volume or fish.submerged_weight" for name in self.untried]
@@ -126,6 +126,11 @@ class Choice:
         larger = unlike[0].larger
         words = ", ".join(f"{d.quantity} ({d.words})" for d in unlike if d.larger == larger)
         return f"{smaller} differs from {larger} in {words}"
+
+
+def percent(share: float) -> str:
+    """Two digits, or all before the point."""
+    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
 
 
 def check_questions(asked: Sequence[str]) -> tuple[str, ...]:
@@ -310,7 +315,5 @@ def _solved(scene: Scene, model: str, orders: Sequence[int], vacuum: Sequence[fl
     try:
         return solve_model(scene, model, orders, vacuum)
     except (ValueError, ArithmeticError) as error:
-        hint = (
-            "; a smaller one by name, --model, is then not compared with it" if compared and model != "vacuum" else ""
-        )
+        hint = "; a smaller one named by --model answers without it" if compared and model != "vacuum" else ""
         raise type(error)(f"the {model} model has no answer: {error}{hint}") from None

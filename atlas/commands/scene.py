@@ -12,7 +12,7 @@ from atlas.commands.common import OK, add_atlas, announce_compilation, announce_
 from atlas.commands.common import speed as dimensionless_speed
 from atlas.drag import DragEquilibria
 from atlas.lookup import Atlas, open_atlas
-from atlas.models import QUESTIONS, Choice, check_questions
+from atlas.models import QUESTIONS, Choice, check_questions, percent
 from atlas.scene import KNOT, MODELS, Scene, read_scene, shipped_scenes
 from kernels import status
 
@@ -280,7 +280,7 @@ def _model_lines(choice: Choice) -> list[str]:
         )
     for d in choice.differences:
         by_it, by_larger = ("none" if v == math.inf else _cell(real(v), 5) for v in (d.by_smaller, d.by_larger))
-        apart = f"{100 * d.relative:.2g} %" if math.isfinite(d.relative) else "-"
+        apart = percent(d.relative) if math.isfinite(d.relative) else "-"
         lines.append(
             f"{d.smaller:<7} {d.larger:<7} {d.quantity:<22} {by_it:>10} {by_larger:>10} {d.unit:<4} {apart:>8}"
             f"{'' if d.agrees else '  disagrees'}"
