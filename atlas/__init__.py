@@ -4,6 +4,7 @@ Importing this package, opening an atlas and looking a value up need numpy and n
 (`solve_critical`) imports numba when it is first called.
 """
 
+from atlas.answers import answer_scene, design
 from atlas.critical import CriticalStates, solve_critical
 from atlas.drag import DragEquilibria, DragShape, drag_shape
 from atlas.drag_folds import DragFolds, solve_drag_folds
@@ -11,6 +12,7 @@ from atlas.drag_table import DragLookup, DragTable, open_drag
 from atlas.equilibria import Equilibria, equilibria
 from atlas.limits import excess_length, massless_cable, threshold_length
 from atlas.lookup import Atlas, open_atlas
+from atlas.scene import read_scene
 from atlas.seal import AtlasFileError
 from atlas.shape import shape
 from atlas.table import EquilibriaTable, FishPositions, open_equilibria
@@ -28,6 +30,8 @@ __all__ = [
     "Equilibria",
     "EquilibriaTable",
     "FishPositions",
+    "answer_scene",
+    "design",
     "drag_shape",
     "equilibria",
     "excess_length",
@@ -35,6 +39,7 @@ __all__ = [
     "open_atlas",
     "open_drag",
     "open_equilibria",
+    "read_scene",
     "shape",
     "solve_critical",
     "solve_drag_folds",

@@ -1,16 +1,18 @@
 """What is asked about a scene: its critical speeds, its shapes, and the cables that bring the fish to a depth."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atlas.checks import check_one
 from atlas.critical import solve_critical
-from atlas.equilibria import Equilibria, vacuum_equilibria
+from atlas.drag import DragEquilibria
+from atlas.equilibria import Equilibria
 from atlas.limits import transitions
 from atlas.lookup import Atlas
+from atlas.models import QUESTIONS, Choice, least_model
 from atlas.placement import Placements, cables_to_depth
 from atlas.scene import Scene
 from kernels import status
@@ -19,6 +21,8 @@ from kernels import status
 NEAR = 0.1
 # Transitions listed at least, and asked for at a time.
 BLOCK = 6
+# What the model of a design is chosen for: where the fish hangs.
+DESIGN_QUESTIONS = ("nodes", "position", "tension")
 # Cables are searched up to this many times the way from the tow point to the depth wanted, below the centre.
 LONGEST = 10.0
 
@@ -52,11 +56,19 @@ class Jumps:
 
 @dataclass(frozen=True)
 class SceneAnswer:
-    """A scene's critical speeds and equilibria, by the vacuum model; dimensionless, as the scene's groups."""
+    """A scene's critical speeds in a vacuum, the model chosen for it and what that one answers.
+
+    jumps : dimensionless, by the vacuum model. choice : the model used and why, with its answers in SI.
+    """
 
     scene: Scene
     jumps: Jumps
-    equilibria: Equilibria
+    choice: Choice
+
+    @property
+    def equilibria(self) -> Equilibria | DragEquilibria:
+        """Those of the model used, dimensionless, as its groups."""
+        return self.choice.answer.equilibria
 
 
 @dataclass(frozen=True)
@@ -74,6 +86,27 @@ class Design:
     cables: Placements
     chosen: NDArray[np.bool_]
     jumps: list[Jumps]
+
+    @property
+    def median(self) -> NDArray[np.bool_]:
+        """Which of the cables have their median root there, the shape that is expected to be seen."""
+        passed = np.array([int(np.sum(jumps.gamma < self.scene.gamma)) for jumps in self.jumps], int)
+        return (self.cables.nodes == passed) & ~self.cables.outer
+
+    def choices(self, model: str | None = None, before_drag: Callable[[], object] = lambda: None) -> dict[int, Choice]:
+        """The least model for nodes, position and tension of each cable chosen that is a median one, by row.
+
+        Parameters, errors as `atlas.models.least_model`.
+        """
+        return {
+            int(k): least_model(
+                replace(self.scene, length=float(self.cables.lam[k]) * self.scene.radius),
+                model,
+                DESIGN_QUESTIONS,
+                before_drag=before_drag,
+            )
+            for k in np.flatnonzero(self.chosen & self.median)
+        }
 
 
 def critical_speeds(
@@ -132,9 +165,14 @@ def _block(
 
 
 def answer_scene(
-    scene: Scene, atlas: Atlas | None = None, before_solving: Callable[[], object] = lambda: None
+    scene: Scene,
+    atlas: Atlas | None = None,
+    before_solving: Callable[[], object] = lambda: None,
+    model: str | None = None,
+    asked: Sequence[str] = QUESTIONS,
+    before_drag: Callable[[], object] = lambda: None,
 ) -> SceneAnswer:
-    """Critical speeds and all equilibria of a scene, by the vacuum model.
+    """Critical speeds and equilibria of a scene, by the least model that answers what is asked.
 
     Parameters
     ----------
@@ -143,18 +181,20 @@ def answer_scene(
         Where critical speeds are looked up if it holds them.
     before_solving : callable
         See `critical_speeds`.
+    model, asked, before_drag
+        See `atlas.models.least_model`.
 
     Raises
     ------
     ValueError
-        If the scene has no length.
+        If the scene has no length, or one of the models no such cable.
     ArithmeticError
         If the computation overflows or does not converge.
 
     Examples
     --------
     >>> from atlas.scene import read_scene
-    >>> answer = answer_scene(read_scene("skop-fig3"))
+    >>> answer = answer_scene(read_scene("skop-fig3"), model="vacuum")
     >>> answer.equilibria.nodes[answer.equilibria.median]
     array([1])
     """
@@ -162,7 +202,24 @@ def answer_scene(
     if not np.isfinite(groups.lam):
         raise ValueError(f"{scene.source}: cable.length is missing; a design finds one: towatlas design --help")
     jumps = critical_speeds(groups.lam, groups.w_f, groups.gamma, atlas, before_solving)
-    return SceneAnswer(scene=scene, jumps=jumps, equilibria=vacuum_equilibria(groups.lam, groups.w_f, groups.gamma))
+    passed = int(np.sum(jumps.gamma < groups.gamma))
+    # The pairs that decide where the cable jumps, as it slows down and speeds up; one more should the second be gone.
+    there = (jumps.n >= passed) & (jumps.n <= passed + 2)
+    choice = least_model(
+        scene,
+        model,
+        asked,
+        orders=jumps.n[there].tolist(),
+        vacuum=jumps.gamma[there].tolist(),
+        compared=[n for n in (passed, passed + 1) if n in jumps.n],
+        before_drag=before_drag,
+    )
+    return SceneAnswer(scene=scene, jumps=jumps, choice=choice)
+
+
+def longest_searched(scene: Scene, depth: float, max_length: float | None = None) -> float:
+    """Longest cable [m] that a design looks at."""
+    return LONGEST * float(np.hypot(depth, scene.radius)) if max_length is None else check_one("length", max_length)
 
 
 def design(
@@ -202,7 +259,7 @@ def design(
     depth = check_one("depth", depth)
     if not max_radius > 0.0:
         raise ValueError(f"max_radius must be positive, got {max_radius:g}")
-    longest = LONGEST * float(np.hypot(depth, scene.radius)) if max_length is None else check_one("length", max_length)
+    longest = longest_searched(scene, depth, max_length)
     groups = scene.groups("vacuum")
     cables = cables_to_depth(groups.w_f, groups.gamma, depth / scene.radius, longest / scene.radius)
     return Design(

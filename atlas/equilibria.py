@@ -182,38 +182,51 @@ def _failure(lam: float, w_f: float, gamma: float, code: int) -> ArithmeticError
     return ArithmeticError(f"lam = {lam:g}, w_f = {w_f:g}, gamma = {gamma:g}: {status.SENTENCES[code]}")
 
 
+def needs_lanes(lam: float, w_f: float, gamma: float) -> bool:
+    """Whether a cable has so many nodes that `vacuum_equilibria` takes the kernel of many lanes; errors as there."""
+    last, code = _highest(w_f, lam, gamma)
+    return code == status.OK and last > FEW
+
+
 # What overflows becomes a status of the shots.
 @np.errstate(over="ignore", invalid="ignore")
-def _all_members(w_f: float, lam: float, gamma: float) -> tuple[NDArray[np.int64], Members]:
-    """Nodes and states of all equilibria of one cable."""
+def _highest(w_f: float, lam: float, gamma: float) -> tuple[int, int]:
+    """Highest pair of equilibria that one cable may have, and a status."""
     # Extrema too low to reach gamma^2 are as many as the half waves of a straight cable, millions at high speeds: of
     # those beyond the last n with a transition only one is looked for, as a check on the closed form.
     half_waves = 2.0 / np.pi * gamma * lam / (np.sqrt(w_f + lam) + np.sqrt(w_f))
     possible = float(np.ceil((lam + 1.0 - threshold_offset(w_f)) / 2.0))
     if half_waves * (1.0 + 2.0 * min(possible, half_waves)) > HALF_WAVES:
         raise _failure(lam, w_f, gamma, status.STEP_LIMIT)
+    highest, codes = extrema(np.array([w_f]), np.array([lam]), np.array([gamma]), shoot_singly)
+    return min(int(highest[0]), int(possible)), int(codes[0])
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _all_members(w_f: float, lam: float, gamma: float) -> tuple[NDArray[np.int64], Members]:
+    """Nodes and states of all equilibria of one cable."""
+    last, code = _highest(w_f, lam, gamma)
+    if code != status.OK:
+        raise _failure(lam, w_f, gamma, code)
     cable = np.array([w_f]), np.array([lam]), np.array([gamma])
-    highest, codes = extrema(*cable, shoot_singly)
-    last = min(int(highest[0]), int(possible))
     shoot = shoot_singly if last <= FEW else shoot_lanes
 
     def solve(n: NDArray[np.int64], outer: bool) -> Members:
         w_f, lam, gamma = (np.full(len(n), column[0]) for column in cable)
         return solve_members(w_f, lam, gamma, n, np.full(len(n), outer), shoot)
 
-    if codes[0] == status.OK:
-        n = np.arange(last + 1)
-        inner = solve(n, False)
-        codes = inner.status
-        there = codes == status.OK
-        outer = solve(n[there & (n > 0)], True)
-        # A pair that is one member short is within rounding of its fold.
-        codes = np.concatenate(
-            [
-                codes[codes != status.NOT_FOUND],
-                np.where(outer.status == status.NOT_FOUND, status.LOST_IN_ROUNDING, outer.status),
-            ]
-        )
+    n = np.arange(last + 1)
+    inner = solve(n, False)
+    codes = inner.status
+    there = codes == status.OK
+    outer = solve(n[there & (n > 0)], True)
+    # A pair that is one member short is within rounding of its fold.
+    codes = np.concatenate(
+        [
+            codes[codes != status.NOT_FOUND],
+            np.where(outer.status == status.NOT_FOUND, status.LOST_IN_ROUNDING, outer.status),
+        ]
+    )
     if (codes != status.OK).any():
         raise _failure(lam, w_f, gamma, int(codes.max()))
     nodes = np.concatenate([n[there], n[there & (n > 0)]])

@@ -119,6 +119,19 @@ def cables_to_depth(w_f: float, gamma: float, z_f: float, lam_max: float) -> Pla
     )
 
 
+def needs_lanes(w_f: float, gamma: float, lam_max: float) -> bool:
+    """Whether the longest cable has so many nodes that the search takes the kernel of many lanes; ArithmeticError
+    where it would take minutes."""
+    highest, codes = extrema(np.array([w_f]), np.array([MARGIN * lam_max]), np.array([gamma]), shoot_singly)
+    _check(codes)
+    if highest[0] > HALF_WAVES:
+        raise ArithmeticError(
+            f"cables up to {lam_max:g} tow radii long would have shapes of up to {highest[0] / MARGIN:.0f} nodes at this "
+            "speed, too many to search; name a shorter longest cable (--max-length)"
+        )
+    return bool(highest[0] > FEW)
+
+
 @dataclass(frozen=True)
 class _Ends:
     """Shots where they reach the depth wanted: p / gamma^2, its slope by log a, and the state. nan: not reached."""
@@ -139,14 +152,7 @@ class _Search:
         self.mu, self.depth = self.gamma2 * w_f, self.gamma2 * z_f
         self.lam_max = lam_max
         self.longest = MARGIN * self.gamma2 * lam_max
-        highest, codes = extrema(np.array([w_f]), np.array([MARGIN * lam_max]), np.array([gamma]), shoot_singly)
-        _check(codes)
-        if highest[0] > HALF_WAVES:
-            raise ArithmeticError(
-                f"cables up to {lam_max:g} tow radii long would have shapes of up to {highest[0] / MARGIN:.0f} nodes "
-                "at this speed, too many to search; name a shorter longest cable (--max-length)"
-            )
-        self.shoot: Shoot = shoot_singly if highest[0] <= FEW else shoot_lanes
+        self.shoot: Shoot = shoot_lanes if needs_lanes(w_f, gamma, lam_max) else shoot_singly
 
     def ends(self) -> tuple[float, float]:
         """Between which log a every equilibrium lies."""

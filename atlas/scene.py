@@ -385,6 +385,11 @@ def _fish_mass(values: dict[str, Any], density: float, gravity: float) -> float:
             raise ValueError(
                 "fish.mass, fish.volume and fish.submerged_weight are all given: each follows from the other two"
             )
+        if not density and "fish.submerged_weight" in values:
+            raise ValueError(
+                "fish.mass and fish.submerged_weight are both given, and in a vacuum both are the mass of the fish: "
+                "keep one"
+            )
         return values["fish.mass"]
     if "fish.submerged_weight" not in values:
         raise ValueError("fish.mass is missing; without a fish leave out the section [fish]")

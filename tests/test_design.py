@@ -150,7 +150,9 @@ def test_overflow_is_said():
 
 @pytest.fixture
 def ask(capsys, atlas_path):
-    return lambda *arguments: run(capsys, "design", "--scene", "skop-fig3", "--atlas", atlas_path, *arguments)
+    return lambda *arguments: run(
+        capsys, "design", "--scene", "skop-fig3", "--model", "vacuum", "--atlas", atlas_path, *arguments
+    )
 
 
 def test_shell(ask):
@@ -210,5 +212,5 @@ def test_cables_without_transitions(ask):
 
 
 def test_a_search_of_minutes_is_refused():
-    with pytest.raises(ArithmeticError, match="too many to search.*--max-length"):
+    with pytest.raises(ArithmeticError, match=r"too many to search.*--max-length"):
         cables_to_depth(1352, 2.97, 28_600, 286_000)

@@ -104,3 +104,11 @@ def announce_compilation(kernel: str, seconds: int = 20) -> None:
 
     if CACHE is None or not any(CACHE.rglob(f"*.{kernel}-*.nbi")):
         say(f"compiling, once after installation: this takes some {seconds} s")
+
+
+def announce_lanes(lam: float, w_f: float, gamma: float) -> None:
+    """Say so before a cable with very many nodes has the kernel of many lanes compiled."""
+    from atlas.equilibria import needs_lanes
+
+    if needs_lanes(lam, w_f, gamma):
+        announce_compilation("march")

@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from atlas.answers import Design, design
+from atlas.answers import Design, design, longest_searched
 from atlas.commands.common import NO_STATE, OK, add_atlas, announce_compilation, say
 from atlas.commands.scene import add_speed, atlas_if_any, describe_speed, quantity, scene_of
 from atlas.equilibria import equilibria
+from atlas.models import Choice
+from atlas.placement import needs_lanes
+from atlas.scene import MODELS
 
 
 def add(commands: Any) -> None:
@@ -19,7 +22,8 @@ def add(commands: Any) -> None:
         "design",
         help="cable lengths that put the fish of a scene at a depth",
         description="All cable lengths that put the fish at a depth below the plane of the towing circle, by the "
-        "vacuum model, with the distance to the nearest critical speed. The length in the scene is not used.",
+        "vacuum model, with the distance to the nearest critical speed. The length in the scene is not used. For each "
+        "median shape the least model says where the fish hangs with drag and buoyancy.",
     )
     parser.add_argument("--scene", required=True, metavar="FILE", help="a scene, or the name of one that is shipped")
     parser.add_argument("--depth", type=quantity("m"), required=True, metavar="D", help="as 120m; bare: m")
@@ -32,6 +36,9 @@ def add(commands: Any) -> None:
         metavar="L",
         help="longest cable searched; default 10 times the distance from the tow point to the axis at that depth",
     )
+    parser.add_argument(
+        "--model", choices=MODELS, help="says where the fish hangs; vacuum: no other is solved; default: the least"
+    )
     add_speed(parser)
     add_atlas(parser)
     parser.add_argument("--json", action="store_true", help="one object instead of a table")
@@ -42,6 +49,10 @@ def _run(options: argparse.Namespace) -> int:
     scene = scene_of(options.scene, options)
     atlas = atlas_if_any(options.atlas)
     announce_compilation("shoot_each", 5)
+    groups = scene.groups("vacuum")
+    longest = longest_searched(scene, options.depth, options.max_length)
+    if needs_lanes(groups.w_f, groups.gamma, longest / scene.radius):
+        announce_compilation("march")
     found = design(
         scene,
         options.depth,
@@ -50,7 +61,10 @@ def _run(options: argparse.Namespace) -> int:
         atlas,
         lambda: announce_compilation("solve_folds"),
     )
-    rows = _rows(found)
+    choices = {}
+    if options.model != "vacuum":
+        choices = found.choices(options.model, lambda: announce_compilation("shoot_drag", 10))
+    rows = _rows(found, choices)
     reason = None if rows else _reason(found)
     if options.json:
         answer = {
@@ -69,20 +83,21 @@ def _run(options: argparse.Namespace) -> int:
     if reason:
         say(reason)
         return NO_STATE
+    if (warning := _warning(rows)) is not None:
+        say(warning)
     return OK
 
 
-def _rows(found: Design) -> list[dict[str, Any]]:
+def _rows(found: Design, choices: dict[int, Choice]) -> list[dict[str, Any]]:
     scene, cables = found.scene, found.cables
     force = scene.force_unit()
     rows = []
     for k in np.flatnonzero(found.chosen):
         jumps = found.jumps[k]
-        passed = int(np.sum(jumps.gamma < scene.gamma))
         row: dict[str, Any] = {
             "length_m": float(cables.lam[k] * scene.radius),
             "nodes": int(cables.nodes[k]),
-            "median": bool(cables.nodes[k] == passed and not cables.outer[k]),
+            "median": bool(found.median[k]),
             "x_f_m": float(cables.x_f[k] * scene.radius),
             "tension_N": float(cables.tension[k] * force),
             "nearest_n": None,
@@ -90,6 +105,7 @@ def _rows(found: Design) -> list[dict[str, Any]]:
             "distance_gamma": None,
             "distance_relative": None,
             "distance_m_s": None,
+            "by_model": _by_model(choices[int(k)]) if int(k) in choices else None,
         }
         at = jumps.nearest(scene.gamma)
         if at >= 0:
@@ -103,6 +119,34 @@ def _rows(found: Design) -> list[dict[str, Any]]:
             }
         rows.append(row)
     return rows
+
+
+def _by_model(choice: Choice) -> dict[str, Any]:
+    """Where the fish hangs by the least model."""
+    answer = choice.answer
+    x, y, z = answer.position.tolist()
+    return {
+        "model": choice.model,
+        "reason": choice.reason,
+        "nodes": answer.nodes,
+        "x_f_m": x,
+        "y_f_m": y,
+        "z_f_m": z,
+        "tension_N": answer.tension,
+    }
+
+
+def _warning(rows: list[dict[str, Any]]) -> str | None:
+    """What the vacuum model is worth here."""
+    larger = [row for row in rows if row["by_model"] and row["by_model"]["model"] != "vacuum"]
+    if not larger:
+        return None
+    first = larger[0]
+    return (
+        f"lengths are by the vacuum model, which does not hold for {len(larger)} of "
+        f"{sum(row['median'] for row in rows)} median shapes: with {first['length_m']:.6g} m, "
+        f"{first['by_model']['reason']}"
+    )
 
 
 def _reason(found: Design) -> str:
@@ -128,7 +172,7 @@ def _text(found: Design, rows: list[dict[str, Any]]) -> str:
         scene.title or scene.source,
         describe_speed(scene),
         f"fish at {found.depth:.6g} m, cables up to {found.longest:.4g} m (vacuum model); nearest jump: its number, "
-        "critical speed less the scene's",
+        "critical speed less the scene's; of median shapes, where the fish hangs by the least model",
         "",
         f"{'length m':>13} {'nodes':>5} {'fish x m':>13} {'tension N':>13} {'n':>4} {'%':>8} {'gamma':>9} {'m/s':>9}",
     ]
@@ -141,5 +185,10 @@ def _text(found: Design, rows: list[dict[str, Any]]) -> str:
                 f" {row['nearest_n']:>4} {100 * row['distance_relative']:>+8.2f} {row['distance_gamma']:>+9.4g} "
                 f"{row['distance_m_s']:>+9.4g}"
             )
-        lines.append(cells + jump + ("  median" if row["median"] else ""))
+        by = row["by_model"]
+        hangs = ""
+        if by:
+            hangs = f", by {by['model']} {by['z_f_m']:.6g} m deep, {by['nodes']} nodes"
+            hangs = ", the vacuum model holds" if by["model"] == "vacuum" else hangs
+        lines.append(cells + jump + (f"  median{hangs}" if row["median"] else ""))
     return "\n".join(lines)

@@ -4,7 +4,7 @@ import argparse
 import json
 from typing import Any
 
-from atlas.commands.common import OK, announce_compilation, drag, length, number, say, speed, weight
+from atlas.commands.common import OK, announce_compilation, announce_lanes, drag, length, number, say, speed, weight
 from atlas.drag import DragEquilibria
 from atlas.equilibria import equilibria
 from atlas.nomenclature import SYMBOLS
@@ -38,6 +38,7 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     announce_compilation("shoot_each", 5)
+    announce_lanes(options.lam, options.wf, options.gamma)
     given = {name: getattr(options, name) for name in ("C", "m_f", "C_f", "w", "C_t")}
     given = {name: value for name, value in given.items() if value is not None}
     if given:

@@ -8,13 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from atlas.answers import Jumps, SceneAnswer, answer_scene
-from atlas.commands.common import OK, add_atlas, announce_compilation, say
+from atlas.commands.common import OK, add_atlas, announce_compilation, announce_lanes, say
 from atlas.commands.common import speed as dimensionless_speed
+from atlas.drag import DragEquilibria
 from atlas.lookup import Atlas, open_atlas
+from atlas.models import QUESTIONS, Choice, check_questions, percent
 from atlas.scene import KNOT, MODELS, Scene, read_scene, shipped_scenes
 from kernels import status
 
 MEDIA = {"vacuum": "a vacuum", "air": "a nondense fluid", "water": "a dense fluid"}
+DRAG_COLUMNS = ("r_f_m", "x_f_m", "y_f_m", "z_f_m", "lag_deg", "tension_N")
 
 
 def add(commands: Any) -> None:
@@ -22,14 +25,30 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "scene",
         help="critical speeds and shapes of a towing scene in real units",
-        description="Dimensionless groups, critical speeds and equilibria of a scene, a TOML file in real units. "
+        description="Dimensionless groups, critical speeds and equilibria of a scene, a TOML file in real units, by "
+        "the least model whose answers are those of the larger ones within the scene's tolerance. "
         f"Scenes that come with the package, by name: {', '.join(shipped_scenes())}.",
     )
     parser.add_argument("file", metavar="FILE", help="a scene; see docs/scenes.md")
     add_speed(parser)
+    parser.add_argument("--model", choices=MODELS, help="this one, compared with no other; default: the least")
+    parser.add_argument(
+        "--asked",
+        type=_questions,
+        default=QUESTIONS,
+        metavar="WHAT,...",
+        help=f"what the model has to answer, some of {', '.join(QUESTIONS)}; default all",
+    )
     add_atlas(parser)
     parser.add_argument("--json", action="store_true", help="one object instead of tables")
     parser.set_defaults(run=_run)
+
+
+def _questions(text: str) -> tuple[str, ...]:
+    try:
+        return check_questions([name.strip() for name in text.split(",") if name.strip()])
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def quantity(unit: str, bare: str | None = None) -> Any:
@@ -77,8 +96,18 @@ def _run(options: argparse.Namespace) -> int:
     scene = scene_of(options.file, options)
     atlas = atlas_if_any(options.atlas)
     announce_compilation("shoot_each", 5)
-    answer = answer_scene(scene, atlas, lambda: announce_compilation("solve_folds"))
-    print(json.dumps(_object(answer), indent=1) if options.json else _text(answer))
+    groups = scene.groups("vacuum")
+    if math.isfinite(groups.lam):
+        announce_lanes(groups.lam, groups.w_f, groups.gamma)
+    answer = answer_scene(
+        scene,
+        atlas,
+        lambda: announce_compilation("solve_folds"),
+        options.model,
+        options.asked,
+        lambda: announce_compilation("shoot_drag", 10),
+    )
+    print(json.dumps(_object(answer), indent=1) if options.json else text_of(answer))
     for code in {int(code) for code in answer.jumps.status} - {status.OK}:
         say(f"a critical speed could not be had: {status.SENTENCES[code]}")
     return OK
@@ -118,34 +147,92 @@ def _jumps(scene: Scene, jumps: Jumps) -> list[dict[str, Any]]:
 
 def _equilibria(answer: SceneAnswer) -> list[dict[str, Any]]:
     scene, found = answer.scene, answer.equilibria
-    force = scene.force_unit()
-    return [
-        {
-            "nodes": int(found.nodes[k]),
-            "median": bool(found.median[k]),
+    force = scene.force_unit(answer.choice.model)
+    rows = []
+    for k in range(len(found)):
+        row: dict[str, Any] = {"nodes": int(found.nodes[k])}
+        if isinstance(found, DragEquilibria):
+            row |= {
+                "near_axis": bool(found.near_axis[k]),
+                "r_f_m": float(found.r_f[k] * scene.radius),
+                "lag_deg": math.degrees(found.lag[k]),
+                "y_f_m": float(found.y_f[k] * scene.radius),
+                "R_y0_N": float(found.R_y0[k] * force),
+                "R_z0_N": float(found.R_z0[k] * force),
+            }
+        else:
+            row["median"] = bool(found.median[k])
+        row |= {
             "x_f_m": float(found.x_f[k] * scene.radius),
             "z_f_m": float(found.z_f[k] * scene.radius),
             "tension_N": float(found.tension[k] * force),
             "R_x0_N": float(found.R_x0[k] * force),
             "R_x0": float(found.R_x0[k]),
         }
-        for k in range(len(found))
+        rows.append(row)
+    return rows
+
+
+def _folds(answer: SceneAnswer) -> list[dict[str, Any]]:
+    """Of the model used, where it has drag."""
+    scene, folds = answer.scene, answer.choice.answer.folds
+    if answer.choice.model == "vacuum":
+        return []
+    return [
+        {
+            "n": int(folds.n[k]),
+            "appears": _where(scene, float(folds.appears[k])),
+            "ends": _where(scene, float(folds.ends[k])),
+            "C_cusp": real(folds.C_cusp[k]),
+        }
+        for k in range(len(folds.n))
+    ]
+
+
+def _where(scene: Scene, gamma: float) -> dict[str, float | None] | str:
+    """A critical speed in every unit, or a word: it does not exist, or is not known."""
+    return speeds(scene, gamma) if math.isfinite(gamma) else "never" if gamma == math.inf else "not_known"
+
+
+def _differences(choice: Choice) -> list[dict[str, Any]]:
+    # Whole numbers and speeds that do not exist have no relative difference.
+    return [
+        {
+            "smaller": d.smaller,
+            "larger": d.larger,
+            "question": d.question,
+            "quantity": d.quantity,
+            "unit": d.unit,
+            "by_smaller": real(d.by_smaller),
+            "by_larger": real(d.by_larger),
+            "relative_difference": real(d.relative),
+            "agrees": d.agrees,
+        }
+        for d in choice.differences
     ]
 
 
 def _object(answer: SceneAnswer) -> dict[str, Any]:
-    scene = answer.scene
+    scene, choice = answer.scene, answer.choice
     return {
         "title": scene.title,
         "file": scene.source,
         "medium": scene.medium,
-        "model": "vacuum",
+        "model": choice.model,
+        "model_forced": choice.forced,
+        "model_reason": choice.reason,
+        "tolerance": choice.tolerance,
+        "asked": choice.asked,
+        "comparisons": _differences(choice),
         "groups": _groups(scene, scene.medium),
         "groups_by_model": {model: _groups(scene, model) for model in MODELS},
         "speed": speeds(scene, scene.gamma),
         "transitions": answer.jumps.existing,
+        "critical_speeds_model": "vacuum",
         "critical_speeds": _jumps(scene, answer.jumps),
+        "critical_speeds_with_drag": _folds(answer),
         "equilibria": _equilibria(answer),
+        "searched": answer.equilibria.searched if isinstance(answer.equilibria, DragEquilibria) else None,
     }
 
 
@@ -162,19 +249,57 @@ def describe_speed(scene: Scene) -> str:
     )
 
 
-def _text(answer: SceneAnswer) -> str:
+def text_of(answer: SceneAnswer) -> str:
+    """Everything about a scene, for people."""
     scene = answer.scene
     by_model = {model: _groups(scene, model) for model in MODELS}
     lines = [scene.title or scene.source, describe_speed(scene), f"towed in {MEDIA[scene.medium]}", ""]
     lines.append(f"{'group':<8}" + "".join(f" {model:>12}" for model in MODELS))
     for name in by_model["vacuum"]:
         lines.append(f"{name:<8}" + "".join(f" {_cell(by_model[model][name]):>12}" for model in MODELS))
-    lines += ["", *_jump_lines(answer), "", "equilibria (vacuum model), the fish in m, forces in N"]
-    lines.append(f"{'nodes':>5} {'x_f':>13} {'z_f':>13} {'tension':>13} {'R_x0':>13}")
-    for row in _equilibria(answer):
-        cells = " ".join(f"{_cell(row[name], 8):>13}" for name in ("x_f_m", "z_f_m", "tension_N", "R_x0_N"))
-        lines.append(f"{row['nodes']:>5} {cells}{'  median' if row['median'] else ''}")
+    lines += ["", *_model_lines(answer.choice), "", *_jump_lines(answer), ""]
+    if _folds(answer):
+        lines += [*_fold_lines(answer), ""]
+    lines.append(f"equilibria ({answer.choice.model} model), the fish in m, forces in N")
+    rows = _equilibria(answer)
+    columns = ("x_f_m", "z_f_m", "tension_N", "R_x0_N") if "median" in rows[0] else DRAG_COLUMNS
+    lines.append(f"{'nodes':>5} " + " ".join(f"{name.removesuffix('_m').removesuffix('_N'):>13}" for name in columns))
+    for row in rows:
+        cells = " ".join(f"{_cell(row[name], 8):>13}" for name in columns)
+        mark = "  median" if row.get("median") else "  near axis" if row.get("near_axis") else ""
+        lines.append(f"{row['nodes']:>5} {cells}{mark}")
     return "\n".join(lines)
+
+
+def _model_lines(choice: Choice) -> list[str]:
+    """The model used, why, and the comparison."""
+    lines = [f"{choice.model} model: {choice.reason}"]
+    if choice.differences:
+        lines.append(
+            f"{'model':<7} {'against':<7} {'in':<22} {'by it':>10} {'by larger':>10} {'unit':<4} {'differ':>8}"
+        )
+    for d in choice.differences:
+        by_it, by_larger = ("none" if v == math.inf else _cell(real(v), 5) for v in (d.by_smaller, d.by_larger))
+        apart = percent(d.relative) if math.isfinite(d.relative) else "-"
+        lines.append(
+            f"{d.smaller:<7} {d.larger:<7} {d.quantity:<22} {by_it:>10} {by_larger:>10} {d.unit:<4} {apart:>8}"
+            f"{'' if d.agrees else '  disagrees'}"
+        )
+    return lines
+
+
+def _fold_lines(answer: SceneAnswer) -> list[str]:
+    """Critical speeds with drag."""
+    lines = [f"critical speeds ({answer.choice.model} model) of the last pair passed and the next, m/s"]
+    lines.append(f"{'n':>5} {'appears':>13} {'ends':>13} {'C':>13} {'gone above':>13}")
+    drag = answer.choice.answer.groups.C
+    for row in _folds(answer):
+        cells = [
+            where if isinstance(where, str) else _cell(where["speed_m_s"], 8) for where in (row["appears"], row["ends"])
+        ]
+        cells += [_cell(drag, 6), _cell(row["C_cusp"], 6)]
+        lines.append(f"{row['n']:>5} " + " ".join(f"{cell:>13}" for cell in cells))
+    return lines
 
 
 def _jump_lines(answer: SceneAnswer) -> list[str]:

@@ -1,0 +1,287 @@
+"""The least model: what each question needs on the report's systems, and what breaks each comparison."""
+
+import json
+import sys
+import tomllib
+from dataclasses import replace
+from math import inf, nan
+from pathlib import Path
+
+import numpy as np
+import pytest
+import reference_drag
+from test_cli import run
+from test_drag import PHOTOGRAPHS
+from test_scene import changed
+
+import atlas
+from atlas.answers import answer_scene
+from atlas.branches import shoot_lanes
+from atlas.commands.common import announce_lanes
+from atlas.commands.scene import text_of
+from atlas.drag_shots import System
+from atlas.model_folds import ModelFolds, follow_folds, model_folds
+from atlas.models import QUESTIONS, check_questions, choose, compare, least_model, solvable_models, solve_model
+from atlas.placement import cables_to_depth, needs_lanes
+from atlas.scene import make_scene, read_scene
+from benchmarks import models
+
+FIGURES = {(37.8, 1352): "skop-fig3", (52.4, 1352): "skop-fig4", (52.4, 1571): "skop-fig5"}
+HANGS = ("nodes", "position", "tension")
+PAGE = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text()
+PAGE_SCENE = PAGE.split("```toml\n")[1].split("```")[0]
+
+
+@pytest.fixture(scope="module")
+def photographs():
+    """Scene, nodes photographed, and the answers of two models, without critical speeds."""
+    rows = []
+    for lam, w_f, gamma, photographed, _ in PHOTOGRAPHS:
+        scene = read_scene(FIGURES[lam, w_f]).at(gamma=gamma)
+        rows.append((scene, photographed, [solve_model(scene, model) for model in ("vacuum", "air")]))
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("asked", "tolerance", "chosen"),
+    [(("nodes",), 0.01, "vvvvaavv"), (HANGS, 0.01, "vavvaaav"), (HANGS, 0.1, "vvvvaavv")],
+)
+def test_models_of_the_photographs(photographs, asked, tolerance, chosen):
+    """Asked for the nodes alone, the rule takes drag on exactly where the vacuum is wrong."""
+    found = [choose(replace(scene, tolerance=tolerance), answers, asked) for scene, _, answers in photographs]
+    assert "".join(choice.model[0] for choice in found) == chosen
+    if asked == ("nodes",):
+        assert [choice.model == "vacuum" for choice in found] == [
+            answers[0].nodes == nodes for _, nodes, answers in photographs
+        ]
+        assert [choice.answer.nodes for choice in found] == [nodes for _, nodes, _ in photographs]
+
+
+def test_a_fold_that_drag_takes_away():
+    """Where the fish hangs is the vacuum's to seven digits; the next jump, at gamma = 3.34, does not exist."""
+    scene = read_scene("skop-fig3").at(gamma=1.64)
+    answer = answer_scene(scene)
+    assert answer.choice.model == "air"
+    gone = [d for d in answer.choice.differences if not d.agrees]
+    assert {(d.smaller, d.quantity, d.by_larger) for d in gone} == {("vacuum", "critical speed 2", inf)}
+    assert "vacuum differs from air in critical speed 2 (1.4" in answer.choice.reason
+    assert "air agrees with water within 1 %, at most 0.0" in answer.choice.reason
+    assert answer.equilibria is answer.choice.answer.equilibria
+    assert answer.equilibria.C == scene.groups("air").C
+    assert answer_scene(scene, asked=HANGS).choice.model == "vacuum"
+    text = text_of(answer)
+    lines = text.splitlines()
+    assert sum(line.startswith("vacuum  air ") and line.endswith("disagrees") for line in lines) == 1
+    (row,) = (line.split() for line in lines if line.split()[:3] == ["2", "never", "never"])
+    assert float(row[3]) == pytest.approx(0.018, abs=1e-4)
+    assert float(row[4]) < float(row[3])
+    assert text.count("near axis") == 1
+
+
+def test_buoyancy_without_drag():
+    """Towed slowly in water: drag adds nothing, and the next larger model alone would vouch for the vacuum."""
+    choice = least_model(make_scene(changed(tow__speed=0.005)), asked=HANGS)
+    assert choice.model == "water"
+    by_pair = {(d.smaller, d.larger, d.question): d for d in choice.differences}
+    assert all(by_pair["vacuum", "air", question].agrees for question in HANGS)
+    assert by_pair["vacuum", "water", "tension"].relative > 0.3
+    # W - W' and the cable's weight, hanging straight down.
+    weight = (60 - 20.5 + 150 * (0.5 - 1025 * np.pi * 36e-6)) * 9.80665
+    assert choice.answer.tension == pytest.approx(weight, rel=1e-4)
+    assert "water is the largest model" in choice.reason
+
+
+def test_differences():
+    """Of two answers made up."""
+    scene = make_scene(changed(fluid={"name": "vacuum"}))
+    one = solve_model(scene, "vacuum", (1, 2, 3, 4, 5), (1.0, inf, inf, nan, 2.0))
+    folds = ModelFolds.of_vacuum((1, 2, 3, 4, 5), (1.005, inf, 3.0, nan, 2.1))
+    moved = one.position + np.array([0.0, 0.0, 1.0])
+    other = replace(one, model="air", folds=folds, position=moved, tension=one.tension * 1.005, nodes=one.nodes + 1)
+    found = {d.quantity: d for d in compare(one, other, scene, (1, 2, 3, 4, 5))}
+    slant = np.linalg.norm(moved - [40.0, 0.0, 0.0])
+    assert found["position of the fish"].relative == pytest.approx(1.0 / slant, rel=1e-12)
+    assert found["tow tension"].relative == pytest.approx(1 - 1 / 1.005, rel=1e-9)
+    assert found["critical speed 1"].relative == pytest.approx(1 - 1 / 1.005, rel=1e-9)
+    assert found["critical speed 1"].by_larger == pytest.approx(scene.speed_of(1.005), rel=1e-15)
+    agreed = {quantity for quantity, d in found.items() if d.agrees}
+    assert agreed == {"position of the fish", "tow tension", "number of equilibria"} | {
+        f"critical speed {n}" for n in (1, 2)
+    }
+    assert found["critical speed 3"].words == f"none, {scene.speed_of(3.0):.4g}"
+    assert found["critical speed 4"].words == "not known, not known"
+    strict = {d.quantity for d in compare(one, other, replace(scene, tolerance=1e-3), (1,)) if d.agrees}
+    assert strict == {"number of equilibria"}
+    assert compare(one, other, replace(scene, tolerance=0.5 / slant), ())[1].agrees is False
+    assert choose(scene, [one, other], ("tension",)).model == "vacuum"
+    assert choose(scene, [one, other], ("nodes", "tension")).model == "air"
+    assert choose(scene, [one, other], ("speeds",), (1, 2)).model == "vacuum"
+    for n in (3, 4, 5):
+        assert choose(scene, [one, other], ("speeds",), (n,)).model == "air"
+
+
+def test_one_model():
+    vacuum = make_scene(changed(fluid={"name": "vacuum"}))
+    choice = least_model(vacuum)
+    assert (choice.model, choice.forced, choice.differences) == ("vacuum", False, ())
+    assert "nothing to add" in choice.reason
+    choice = least_model(make_scene(changed()), "vacuum")
+    assert (choice.model, choice.forced, len(choice.answers)) == ("vacuum", True, 1)
+    assert "compared with no other" in choice.reason
+    # A fluid that neither drags nor buoys is the vacuum.
+    thin = make_scene(changed(cable__drag_coefficient=0, fish__drag_coefficient=0, fluid__density=1e-3))
+    choice = least_model(thin, "air")
+    assert choice.answer.equilibria.R_x0 == pytest.approx(least_model(thin, "vacuum").answer.equilibria.R_x0)
+
+
+def test_keys_that_are_missing():
+    scene = make_scene(changed(fluid={"name": "air"}, fish__volume=None, tow__speed=0.5))
+    assert solvable_models(scene) == (["vacuum", "air"], ["water"])
+    assert (
+        "water was not tried: it needs fish.volume or fish.submerged_weight" in least_model(scene, asked=HANGS).reason
+    )
+    with pytest.raises(ValueError, match="the water model needs w_f, for which keys of the scene are missing"):
+        least_model(scene, "water")
+    with pytest.raises(ValueError, match="model must be one of vacuum, air, water"):
+        least_model(scene, "mud")
+    assert check_questions(["tension", "nodes"]) == ("nodes", "tension")
+    for bad in ([], ["nodes", "colour"]):
+        with pytest.raises(ValueError, match="asked must be some of nodes, position, tension, speeds"):
+            check_questions(bad)
+
+
+def test_a_cable_that_floats_without_a_fish():
+    scene = make_scene(changed(fish=None, cable__mass_per_length=0.1))
+    with pytest.raises(ValueError, match=r"the water model has no answer: a cable without weight .*--model"):
+        least_model(scene)
+    assert least_model(scene, "vacuum").model == "vacuum"
+
+
+def test_far_beyond_the_drag_of_the_report():
+    """The scene of the page, C = 559: a long-double shot from its fish comes to the tow point, with its tension."""
+    scene = make_scene(tomllib.loads(PAGE_SCENE))
+    answer = solve_model(scene, "water")
+    groups = answer.groups
+    assert groups.C > 500
+    system = System(groups.lam, groups.w_f, groups.m_f, groups.C, groups.C_f, groups.w)
+    end = reference_drag.shot(np.hypot(*answer.position[:2]) / scene.radius, groups.gamma, system)
+    x, y, z, *force = np.asarray(end, float)
+    assert np.hypot(x, y) == pytest.approx(1.0, abs=1e-10)
+    assert -z * scene.radius == pytest.approx(answer.position[2], rel=1e-10)
+    assert np.linalg.norm(force) * scene.force_unit("water") == pytest.approx(answer.tension, rel=1e-10)
+    # The fish at (r, 0) there, the tow point at (1, 0) here.
+    turned = (x - 1j * y) * np.hypot(*answer.position[:2])
+    assert answer.position[:2] == pytest.approx([turned.real, turned.imag], rel=1e-9)
+
+
+def test_folds_of_a_bare_cable_scale():
+    """Loads over w: the cable of weight w at gamma is the one of weight 1 at gamma / sqrt(w), with the same C."""
+    w = 0.6
+    start, end = System(10.0, 0.0, 0.0, 0.02), System(10.0, 0.0, 0.0, 0.02, w=w)
+    folds = atlas.drag_folds.solve_drag_folds(10.0, 0.0, 0.02, n=[1, 2])
+    found = follow_folds(folds.r_f_appears, folds.appears, start, end)
+    assert found == pytest.approx(folds.appears * np.sqrt(w), rel=1e-9)
+
+
+def test_folds_in_a_dense_fluid():
+    """Two equilibria more beyond one: the search from the other side, at given speed."""
+    groups = replace(read_scene("skop-fig3").groups("water"), w=0.7, m_f=1600.0, C=0.01, C_f=0.5)
+    folds = model_folds(groups, (2, 3))
+    assert np.isfinite(folds.appears).any()
+    for gamma in folds.appears[np.isfinite(folds.appears)]:
+        below, above = (
+            len(atlas.equilibria(groups.lam, groups.w_f, gamma * part, groups.C, groups.m_f, groups.C_f, groups.w))
+            for part in (0.998, 1.002)
+        )
+        assert above == below + 2
+
+
+def test_shell(capsys, tmp_path):
+    arguments = ("scene", "skop-fig4", "--gamma", 4.77, "--atlas", tmp_path / "none.nc", "--asked", "nodes,tension")
+    code, out, _ = run(capsys, *arguments, "--json")
+    answer = json.loads(out)
+    assert (code, answer["model"], answer["model_forced"], answer["asked"]) == (0, "air", False, ["nodes", "tension"])
+    assert answer["model_reason"].startswith("vacuum differs from air in number of nodes (2, 3), tow tension (9.5 %)")
+    nodes, tension = answer["comparisons"][:2]
+    assert (nodes["by_smaller"], nodes["by_larger"], nodes["agrees"]) == (2, 3, False)
+    assert tension["relative_difference"] == pytest.approx(0.0955, abs=1e-4)
+    near = next(row for row in answer["equilibria"] if row["near_axis"])
+    assert near["nodes"] == 3
+    assert near["r_f_m"] == pytest.approx(np.hypot(near["x_f_m"], near["y_f_m"]), rel=1e-12)
+    assert near["lag_deg"] == pytest.approx(np.degrees(np.arctan2(-near["y_f_m"], near["x_f_m"])), rel=1e-9)
+    code, out, _ = run(capsys, *arguments, "--model", "vacuum")
+    assert code == 0
+    assert "vacuum model: vacuum was asked for, and compared with no other" in out
+    assert "equilibria (vacuum model)" in out
+    code, _, err = run(capsys, *arguments, "--asked", "colour")
+    assert code == 2
+    assert "asked must be some of" in err
+
+
+def test_design_says_where_the_vacuum_fails(capsys, tmp_path):
+    (tmp_path / "wet.toml").write_text(PAGE_SCENE)
+    arguments = ("design", "--scene", tmp_path / "wet.toml", "--depth", "120 m", "--atlas", tmp_path / "none.nc")
+    code, out, err = run(capsys, *arguments, "--json")
+    assert code == 0
+    (row,) = json.loads(out)["cables"]
+    assert row["median"]
+    by = row["by_model"]
+    exact = solve_model(replace(make_scene(tomllib.loads(PAGE_SCENE)), length=row["length_m"]), "water")
+    assert (by["model"], by["nodes"]) == ("water", exact.nodes)
+    assert [by["x_f_m"], by["y_f_m"], by["z_f_m"]] == pytest.approx(list(exact.position), rel=1e-9)
+    assert by["z_f_m"] < 110
+    assert "does not hold for 1 of 1 median shapes" in err
+    assert "median, by water 102." in run(capsys, *arguments)[1]
+    code, out, err = run(capsys, *arguments, "--model", "vacuum", "--json")
+    assert json.loads(out)["cables"][0]["by_model"] is None
+    assert "does not hold" not in err
+    arguments = ("design", "--scene", "skop-fig3", "--depth", "25 in", "--max-radius", "1 mm")
+    assert "median, the vacuum model holds" in run(capsys, *arguments, "--atlas", tmp_path / "none.nc")[1]
+
+
+def test_questions_are_named_in_help(capsys):
+    out = run(capsys, "scene", "--help")[1]
+    for question in QUESTIONS:
+        assert question in out
+
+
+def test_benchmark(tmp_path):
+    found = models.measure([("skop-fig5", 2.6, 2)])
+    table = models.systems_table(found)
+    assert "| skop-fig5 | 2.6 | 2 | **1**, 2, 2 | 11 %, 26 % |" in table
+    assert table.splitlines()[-1].endswith("| air | air | air | air | air |")
+    assert models.models_table(found).splitlines()[2].startswith("| vacuum | 0 of 1 | 11 %, 26 % |")
+    models.write_csv(found, tmp_path / "models.csv")
+    lines = (tmp_path / "models.csv").read_text().splitlines()
+    assert len(lines) == 4
+    models.draw(found, [tmp_path / "models.svg"])
+    assert (tmp_path / "models.svg").stat().st_size > 5000
+    marks = "<!-- models: written by python -m benchmarks.models -->\nold<!-- end of models -->"
+    assert models.put(marks, "models", "new\n") == marks.replace("old", "new\n")
+
+
+def test_page_says_what_is_chosen():
+    rows = [line.split(" | ") for line in PAGE.splitlines() if line.startswith("| skop-fig")]
+    assert ["".join(row[k].strip(" |")[0] for row in rows) for k in (6, 7, 8)] == ["vvvvaavv", "vavvaaav", "vvvvaavv"]
+    assert {row[k].strip(" |") for row in rows for k in (9, 10)} == {"air"}
+
+
+@pytest.mark.parametrize(("gamma", "many"), [(1.0, False), (10.0, True)])
+def test_the_kernel_of_many_lanes_is_announced_where_it_is_used(monkeypatch, gamma, many):
+    cable = 300.0, 0.0, gamma
+    used, said = [], []
+
+    def lanes(*arguments):
+        used.append(1)
+        return shoot_lanes(*arguments)
+
+    # The function of the same name hides the module.
+    monkeypatch.setattr(sys.modules["atlas.equilibria"], "shoot_lanes", lanes)
+    monkeypatch.setattr("atlas.commands.common.announce_compilation", said.append)
+    announce_lanes(*cable)
+    atlas.equilibria(*cable)
+    assert (said, bool(used)) == (["march"] if many else [], many)
+    used.clear()
+    monkeypatch.setattr("atlas.placement.shoot_lanes", lanes)
+    cables_to_depth(0.0, gamma, 200.0, 300.0)
+    assert bool(used) == needs_lanes(0.0, gamma, 300.0) == many
