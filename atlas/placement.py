@@ -126,8 +126,8 @@ def needs_lanes(w_f: float, gamma: float, lam_max: float) -> bool:
     _check(codes)
     if highest[0] > HALF_WAVES:
         raise ArithmeticError(
-            f"cables up to {lam_max:g} tow radii long would have shapes of up to {highest[0] / MARGIN:.0f} nodes at this "
-            "speed, too many to search; name a shorter longest cable (--max-length)"
+            f"cables up to {lam_max:g} tow radii long would have shapes of up to {highest[0] / MARGIN:.0f} nodes at "
+            "this speed, too many to search; name a shorter longest cable (--max-length)"
         )
     return bool(highest[0] > FEW)
 
