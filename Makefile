@@ -32,6 +32,7 @@ test: install  ## run the tests
 
 bench: install  ## chart error against time, compare the ratios, update docs and README
 	-$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[peers]'
+	$(BIN)/python -m benchmarks.models
 	$(BIN)/python -m benchmarks
 
 failures: install  ## map where methods fail, write the figure and the tables of docs/failures.md

@@ -243,7 +243,7 @@ def read_scene(path: str | os.PathLike) -> Scene:
     if not file.is_file() and os.fspath(path) in shipped_scenes():
         file = resources.files("atlas") / "scenes" / f"{os.fspath(path)}.toml"
     try:
-        table = tomllib.loads(file.read_text("utf-8"))
+        table = tomllib.loads(file.read_text("utf-8-sig"))
     except FileNotFoundError:
         raise SceneFileError(
             f"no scene at {path}; scenes that come with the package: {', '.join(shipped_scenes())}"
