@@ -145,7 +145,7 @@ def test_files_that_are_no_atlas(small_path, tmp_path):
             atlas.open_atlas(path)
     with pytest.raises(AtlasFileError, match="cannot be read"):
         atlas.open_atlas(tmp_path)
-    with pytest.raises(FileNotFoundError, match="make atlas"):
+    with pytest.raises(FileNotFoundError, match="towatlas build"):
         atlas.open_atlas(tmp_path / "absent.nc")
 
 
