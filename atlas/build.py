@@ -284,7 +284,7 @@ def _scan_grid(scan: ScanSettings, bar: tqdm, label: str) -> tuple[Array, NDArra
     """Scan every cable of the settings: results of shape (w_f, lam, n, 4), statuses (w_f, lam, n)."""
     bar.set_description(label)
     shape = (len(scan.w_f), len(scan.lam))
-    w_f, lam = (np.ascontiguousarray(a.ravel()) for a in np.broadcast_arrays(scan.w_f[:, None], scan.lam))
+    w_f, lam = (column.ravel() for column in np.meshgrid(scan.w_f, scan.lam, indexing="ij"))
     results = np.empty((w_f.size, scan.n_max, 4))
     statuses = np.empty((w_f.size, scan.n_max), np.int64)
     # No fold lies below the resonance of a pendulum as long as the cable, gamma^2 lambda = 1.

@@ -35,6 +35,7 @@ STRAYED = 0.3
 # A last step of Newton after which its error, the square of it, is far below that of the series.
 LAST_STEP = 1e-6
 VACUUM = 1e-12
+NEAR_CUSP = 0.05
 
 
 def _c_grid() -> Array:
@@ -46,7 +47,8 @@ class DragGrid:
     """Where folds with drag are tabulated. The defaults take a few minutes.
 
     stages : nodes in w_f and lambda of the cables traced, and of the series that follow, each predicted by the one
-    before; the last is kept. checks : cables between the nodes for the error, of which traced_checks are traced.
+    before; the last is kept. series_sigma : nodes in sigma, none of them next to the cusp at 0. checks : cables between
+    the nodes for the error, of which traced_checks are traced.
     """
 
     n_max: int = 3
@@ -54,10 +56,10 @@ class DragGrid:
     lam_max: float = 60.0
     w_f_max: float = 2000.0
     sigma_min: float = -0.5
-    stages: tuple[tuple[int, int], ...] = ((9, 4), (27, 8))
-    series_sigma: int = 13
-    checks: int = 96
-    traced_checks: int = 4
+    stages: tuple[tuple[int, int], ...] = ((9, 4), (29, 8))
+    series_sigma: int = 15
+    checks: int = 160
+    traced_checks: int = 5
     error_blocks: int = 6
     w_f: Array = field(default_factory=lambda: np.concatenate([[0.0], 10.0 ** np.linspace(-1.0, 3.25, 18)]))
     lam: Array = field(default_factory=lambda: np.geomspace(16.0, 60.0, 14))
@@ -279,6 +281,8 @@ def _errors(grid: DragGrid, n: int, series: Series, bar: tqdm) -> tuple[Array, A
     y, x = (2.0 * np.modf(k * ratio)[0] - 1.0 for ratio in (1.0 / grid.checks, 0.6180339887498949))
     cables = Cables.at(axes, n, y, x)
     sigma = axes.sigma(midpoints(grid.series_sigma))[::2]
+    # Next to the cusp folds at a given drag are ill posed, and gamma is that of the cusp.
+    sigma = sigma[np.abs(sigma) > NEAR_CUSP]
     traced = np.arange(grid.checks) % max(grid.checks // grid.traced_checks, 1) == 0
     log_cusp, log_gamma = np.empty(len(cables)), np.empty((len(cables), len(sigma)))
     log_cusp[traced], (log_gamma[traced], _) = _traced(cables.part(traced), sigma, bar)
@@ -293,11 +297,14 @@ def _errors(grid: DragGrid, n: int, series: Series, bar: tqdm) -> tuple[Array, A
     error, cusp_error = np.zeros((2, grid.error_blocks, grid.error_blocks))
     np.maximum.at(error, (row, column), MARGIN * wrong)
     np.maximum.at(cusp_error, (row, column), MARGIN * np.abs(moved))
-    # Where no cable lies nothing is known to be better than the worst.
-    empty = np.ones_like(error, bool)
-    empty[row, column] = False
-    error[empty], cusp_error[empty] = error.max(), cusp_error.max()
-    return error, cusp_error
+    return _with_neighbours(error), _with_neighbours(cusp_error)
+
+
+def _with_neighbours(error: Array) -> Array:
+    """The worst of each block and of those around it: the few points in a block may all be far from its corners."""
+    rows, columns = error.shape
+    framed = np.pad(error, 1)
+    return np.max([framed[i : i + rows, j : j + columns] for i in range(3) for j in range(3)], axis=0)
 
 
 def _plain_tables(grid: DragGrid, series: list[Series]) -> xr.Dataset:
