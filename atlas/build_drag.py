@@ -56,7 +56,7 @@ class DragGrid:
     lam_max: float = 60.0
     w_f_max: float = 2000.0
     sigma_min: float = -0.5
-    stages: tuple[tuple[int, int], ...] = ((9, 4), (29, 8))
+    stages: tuple[tuple[int, int], ...] = ((9, 4), (29, 11))
     series_sigma: int = 15
     checks: int = 160
     traced_checks: int = 5
