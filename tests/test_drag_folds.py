@@ -211,6 +211,9 @@ def test_shell(capsys, drag_file, tmp_path):
     assert code == 4
     assert "too much drag" in err
     assert run(capsys, *cable, "--C", "-1")[0] == 2
+    for other in (("--method", "scan"), ("--equilibria",)):
+        assert run(capsys, "build", "--drag", *other, "--out", tmp_path / "none.nc")[0] == 2
+    assert not (tmp_path / "none.nc").exists()
     code, _, err = run(capsys, "plot", "drag", "--out", tmp_path / "drag.svg")
     assert code == 0
     assert (tmp_path / "drag.svg").stat().st_size > 5000
