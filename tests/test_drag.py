@@ -58,7 +58,7 @@ def random_systems(rows, seed):
 def test_shots_agree_with_long_doubles():
     """Relative to the amplitude of the wave, and to the force, and to what moving the fish does to them."""
     worst = []
-    for gamma, system, r in random_systems(40, 4):
+    for gamma, system, r in random_systems(16, 4):
         ends = shoot([r * gamma**2], gamma, system.row(), jets_of(1))
         x, y, _, *force = reference_drag.shot(r, gamma, system)
         scale = gamma**-2
@@ -113,13 +113,13 @@ def test_largest_deflection_as_photographed():
     largest = {}
     for lam, w_f, gamma in ((p.lam, p.w_f, p.gamma) for p in PHOTOGRAPHS[:5]):
         found = in_air(lam, w_f, gamma)
-        largest[lam, gamma] = np.abs(drag_shape(found, 0, np.linspace(0, lam, 400)).y).max()
+        largest[lam, gamma] = np.abs(drag_shape(found, 0, np.linspace(0, lam, 100)).y).max()
     assert max(largest, key=largest.get) == (52.4, 4.77)
 
 
 def test_single_equilibrium_near_the_axis():
     """With the report's drag the second fold is gone: one shape near the axis, two with the cable stretched out."""
-    for gamma in (1.6, 3.0, 4.5, 6.5):
+    for gamma in (1.6, 6.5):
         found = atlas.equilibria(37.8, 1352, gamma, C=0.018)
         assert (found.r_f < 1).sum() == 1
         assert (found.r_f > 36).sum() == 2

@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 import atlas
 from atlas import build_drag as build_drag_module
+from atlas.build import build_atlas
 from atlas.build_drag import DragGrid, build_drag
 from atlas.drag_folds import solve_drag_folds
 from atlas.drag_table import open_drag
@@ -169,7 +170,9 @@ def test_a_grid_over_the_end_of_a_cusp_is_refused(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_an_atlas_without_drag_says_how_to_get_it(capsys, atlas_path, drag_file):
+def test_an_atlas_without_drag_says_how_to_get_it(capsys, tmp_path, drag_file):
+    atlas_path = tmp_path / "vacuum.nc"
+    build_atlas(atlas_path, grid=SMALL_GRID, scan=SMALL_SCAN, progress=False)
     with pytest.raises(atlas.AtlasFileError, match="no folds with drag; `towatlas build --drag`"):
         open_drag(atlas_path)
     code, _, err = run(capsys, "critical", "--lam", "13", "--wf", "0.5", "--C", "0.01", "--atlas", atlas_path)
