@@ -145,9 +145,9 @@ class Series:
     r_f: Array
     cusp: Array
 
-    def guess(self, place: float, y: Array, x: Array) -> Array:
-        """log r, log gamma, shape (2, points), at one sigma and coordinates of shape (points,)."""
-        s = np.full(len(x), place)
+    def guess(self, at_sigma: float, y: Array, x: Array) -> Array:
+        """log r, log gamma, shape (2, points), at one coordinate of sigma and others of shape (points,)."""
+        s = np.full(len(x), at_sigma)
         log_gamma = evaluate(self.gamma, s, y, x)
         return np.stack([evaluate(self.r_f, s, y, x) + 2.0 * log_gamma, log_gamma])
 
@@ -254,20 +254,20 @@ def _folds(cables: Cables, guess: Array, log_c: Array) -> tuple[Array, NDArray[n
 def _series(grid: DragGrid, n: int, bar: tqdm) -> Series:
     """Series of one n: the first stage traced from the vacuum, each other predicted by the one before it."""
     axes = grid.axes
-    s = nodes(grid.series_sigma)
-    series = None
-    for w_f_nodes, lam_nodes in grid.stages:
-        cables = Cables.grid(axes, n, nodes(w_f_nodes), nodes(lam_nodes))
-        if series is None:
-            log_cusp, values = _traced(cables, axes.sigma(s), bar)
-        else:
-            log_cusp, values = _predicted(cables, series, axes, axes.sigma(s), bar)
-        shape = w_f_nodes, lam_nodes
-        plane = coefficients(np.moveaxis(values.reshape(2, *shape, len(s)), -1, 1))
-        fields = np.einsum("ks,fsji->fkji", transform(len(s)), plane, optimize=False)
-        series = Series(fields[0], fields[1], coefficients(log_cusp.reshape(shape)))
-    assert series is not None
+    sigma = axes.sigma(nodes(grid.series_sigma))
+    traced, *refined = (Cables.grid(axes, n, *(nodes(count) for count in stage)) for stage in grid.stages)
+    series = _through(*_traced(traced, sigma, bar), grid.stages[0])
+    for cables, shape in zip(refined, grid.stages[1:], strict=True):
+        series = _through(*_predicted(cables, series, axes, sigma, bar), shape)
     return series
+
+
+def _through(log_cusp: Array, values: Array, shape: tuple[int, int]) -> Series:
+    """Series through log C*, shape (cables,), and log gamma and log r_f, shape (2, cables, sigma), on nodes `shape`."""
+    sigma_nodes = values.shape[-1]
+    plane = coefficients(np.moveaxis(values.reshape(2, *shape, sigma_nodes), -1, 1))
+    fields = np.einsum("ks,fsji->fkji", transform(sigma_nodes), plane, optimize=False)
+    return Series(fields[0], fields[1], coefficients(log_cusp.reshape(shape)))
 
 
 def _errors(grid: DragGrid, n: int, series: Series, bar: tqdm) -> tuple[Array, Array]:

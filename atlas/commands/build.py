@@ -26,7 +26,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--drag",
         action="store_true",
-        help="with folds with drag in the atlas, where pairs of equilibria appear and end; takes some minutes",
+        help="put folds with drag into the atlas too: where pairs of equilibria appear and end; takes some minutes",
     )
     parser.add_argument(
         "--method",
