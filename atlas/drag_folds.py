@@ -185,7 +185,7 @@ def _correct(
         x[i[~bad]] += correction[~bad]
         near = ~bad & (size < NEAR)
         good[i[near]] = True
-        quick[i[near]] = round_ <= 1 or (size[near] < 0.0).all()
+        quick[i[near]] = round_ <= 1
     return x, jacobian, second, good, quick
 
 
@@ -232,13 +232,8 @@ def polish_cusps(z: Array, lam: Array, w_f: Array, parallel: bool = False) -> tu
             break
         jet = shoot(np.exp(z[i, 0]), np.exp(z[i, 1]), _systems(lam[i], w_f[i], np.exp(z[i, 2])), CUSP, parallel).log_rho
         value = np.stack([jet[:, at(k, 0, 0)] for k in range(3)], axis=1)
-        matrix = np.stack(
-            [
-                np.stack([(k + 1) * jet[:, at(k + 1, 0, 0)], jet[:, at(k, 1, 0)], jet[:, at(k, 0, 1)]], axis=1)
-                for k in range(3)
-            ],
-            axis=1,
-        )
+        along = [((k + 1) * jet[:, at(k + 1, 0, 0)], jet[:, at(k, 1, 0)], jet[:, at(k, 0, 1)]) for k in range(3)]
+        matrix = np.stack([np.stack(row, axis=1) for row in along], axis=1)
         step = _solve_systems(matrix, -value)
         size = np.abs(step).max(axis=1)
         far = ~(size < 1.0)
@@ -298,13 +293,8 @@ def solve_at(
         jet = ends.log_rho
         sound = (ends.status == status.OK) & np.isfinite(jet).all(axis=1)
         along_gamma = jet[:, at(0, 1, 0)]
-        jacobian = np.stack(
-            [
-                np.stack([jet[:, at(1, 0, 0)], along_gamma], axis=1),
-                np.stack([2.0 * jet[:, at(2, 0, 0)], jet[:, at(1, 1, 0)]], axis=1),
-            ],
-            axis=1,
-        )
+        entries = (jet[:, at(1, 0, 0)], along_gamma, 2.0 * jet[:, at(2, 0, 0)], jet[:, at(1, 1, 0)])
+        jacobian = np.stack(entries, axis=1).reshape(-1, 2, 2)
         step = _solve_systems(jacobian, -np.stack([jet[:, 0], jet[:, at(1, 0, 0)]], axis=1))
         size = np.abs(step).max(axis=1)
         far = ~sound | ~(size < 1.0)
