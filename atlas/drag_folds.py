@@ -150,14 +150,8 @@ def trace_folds(n: NDArray[np.int64], lam: Array, w_f: Array, parallel: bool = F
         if codes[row] == status.OK and not (complete[row] or turned[row]):
             codes[row] = status.NOT_CONVERGED
         at, along, curvatures = ([entry[k] for entry in history[row]] for k in range(3))
-        curve = Curve(
-            np.array(at).reshape(-1, 3),
-            np.array(along).reshape(-1, 3),
-            np.array(curvatures),
-            bool(complete[row]),
-            int(codes[row]),
-        )
-        curves.append(curve)
+        points, tangents = (np.array(column).reshape(-1, 3) for column in (at, along))
+        curves.append(Curve(points, tangents, np.array(curvatures), bool(complete[row]), int(codes[row])))
     return curves
 
 
@@ -231,10 +225,9 @@ def polish_cusps(z: Array, lam: Array, w_f: Array, parallel: bool = False) -> tu
         if not len(i):
             break
         jet = shoot(np.exp(z[i, 0]), np.exp(z[i, 1]), _systems(lam[i], w_f[i], np.exp(z[i, 2])), CUSP, parallel).log_rho
-        value = np.stack([jet[:, at(k, 0, 0)] for k in range(3)], axis=1)
         along = [((k + 1) * jet[:, at(k + 1, 0, 0)], jet[:, at(k, 1, 0)], jet[:, at(k, 0, 1)]) for k in range(3)]
         matrix = np.stack([np.stack(row, axis=1) for row in along], axis=1)
-        step = _solve_systems(matrix, -value)
+        step = _solve_systems(matrix, -jet[:, [at(k, 0, 0) for k in range(3)]])
         size = np.abs(step).max(axis=1)
         far = ~(size < 1.0)
         z[i] += np.where(far[:, None], np.nan, step)
@@ -290,9 +283,8 @@ def solve_at(
         if not len(i):
             break
         ends = shoot(np.exp(z[i, 0]), np.exp(z[i, 1]), _systems(lam[i], w_f[i], np.exp(z[i, 2])), AT_DRAG, parallel)
-        jet = ends.log_rho
+        jet, along_gamma = ends.log_rho, ends.log_rho[:, at(0, 1, 0)]
         sound = (ends.status == status.OK) & np.isfinite(jet).all(axis=1)
-        along_gamma = jet[:, at(0, 1, 0)]
         entries = (jet[:, at(1, 0, 0)], along_gamma, 2.0 * jet[:, at(2, 0, 0)], jet[:, at(1, 1, 0)])
         jacobian = np.stack(entries, axis=1).reshape(-1, 2, 2)
         step = _solve_systems(jacobian, -np.stack([jet[:, 0], jet[:, at(1, 0, 0)]], axis=1))
