@@ -24,8 +24,8 @@ atlas: install  ## build build/atlas.nc
 equilibria: install  ## build build/equilibria.nc, the table of fish positions
 	$(BIN)/python -m atlas build --equilibria
 
-drag: install  ## build build/drag.nc, the table of folds with drag; some minutes
-	$(BIN)/python -m atlas build --drag
+drag: install  ## build build/atlas.nc with the folds with drag in it; some minutes
+	$(BIN)/python -m atlas build --drag --out $(ATLAS)
 
 test: install  ## run the tests
 	$(BIN)/python -m pytest

@@ -3,7 +3,7 @@
 import importlib.metadata
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -43,6 +43,7 @@ class Summary:
     witness: str
     seconds: float
     bytes: int
+    drag: str = ""
 
     def __str__(self) -> str:
         lines = [
@@ -53,6 +54,8 @@ class Summary:
         ]
         if self.witness:
             lines.append(f"  witness      {self.witness}")
+        if self.drag:
+            lines.append(f"  drag         {self.drag}")
         return "\n".join([*lines, f"  time         {self.seconds:.1f} s"])
 
 
@@ -84,6 +87,7 @@ def build_atlas(
     scan: ScanSettings | None = None,
     threads: int | None = None,
     progress: bool = True,
+    extra: Mapping[str, xr.Dataset] | None = None,
 ) -> Summary:
     """Build an atlas file and move it into place.
 
@@ -122,8 +126,9 @@ def build_atlas(
         else:
             root, groups, facts = _build_scan(scan, bar)
         bar.set_description("writing")
-        root.attrs = root_attributes(method, provenance(f"--method {method}") | facts.pop("attributes"))
-        write_atlas(path, root, groups)
+        options = "--drag" if extra else f"--method {method}"
+        root.attrs = root_attributes(method, provenance(options) | facts.pop("attributes"))
+        write_atlas(path, root, groups | dict(extra or {}))
     return Summary(path=path, method=method, seconds=time.perf_counter() - start, bytes=path.stat().st_size, **facts)
 
 

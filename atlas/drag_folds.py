@@ -22,6 +22,7 @@ from atlas.limits import unchecked_excess_length
 from kernels import status
 
 FOLD = jets_of(2, gamma=True, drag=True)
+AT_DRAG = jets_of(2, gamma=True)
 CUSP = jets_of(3, gamma=True, drag=True)
 
 GAMMA_MAX = 50.0
@@ -149,14 +150,8 @@ def trace_folds(n: NDArray[np.int64], lam: Array, w_f: Array, parallel: bool = F
         if codes[row] == status.OK and not (complete[row] or turned[row]):
             codes[row] = status.NOT_CONVERGED
         at, along, curvatures = ([entry[k] for entry in history[row]] for k in range(3))
-        curve = Curve(
-            np.array(at).reshape(-1, 3),
-            np.array(along).reshape(-1, 3),
-            np.array(curvatures),
-            bool(complete[row]),
-            int(codes[row]),
-        )
-        curves.append(curve)
+        points, tangents = (np.array(column).reshape(-1, 3) for column in (at, along))
+        curves.append(Curve(points, tangents, np.array(curvatures), bool(complete[row]), int(codes[row])))
     return curves
 
 
@@ -184,7 +179,7 @@ def _correct(
         x[i[~bad]] += correction[~bad]
         near = ~bad & (size < NEAR)
         good[i[near]] = True
-        quick[i[near]] = round_ <= 1 or (size[near] < 0.0).all()
+        quick[i[near]] = round_ <= 1
     return x, jacobian, second, good, quick
 
 
@@ -216,6 +211,13 @@ def solve_cusps(curves: list[Curve], lam: Array, w_f: Array, parallel: bool = Fa
             continue
         a, b = curve.curvatures[k], curve.curvatures[k + 1]
         z[row] = between(curve, k, a / (a - b))
+    solved, solved_codes = polish_cusps(z, lam, w_f, parallel)
+    return solved, np.where(np.isfinite(z).all(axis=1), solved_codes, codes)
+
+
+def polish_cusps(z: Array, lam: Array, w_f: Array, parallel: bool = False) -> tuple[Array, NDArray[np.int64]]:
+    """Cusps near the guesses z, rows log r, log gamma, log C, by Newton; statuses; nan rows pass."""
+    z, codes = z.copy(), np.full(len(z), status.NOT_CONVERGED)
     active = np.asarray(np.isfinite(z).all(axis=1))
     at = CUSP.at
     for _ in range(ROUNDS):
@@ -223,15 +225,9 @@ def solve_cusps(curves: list[Curve], lam: Array, w_f: Array, parallel: bool = Fa
         if not len(i):
             break
         jet = shoot(np.exp(z[i, 0]), np.exp(z[i, 1]), _systems(lam[i], w_f[i], np.exp(z[i, 2])), CUSP, parallel).log_rho
-        value = np.stack([jet[:, at(k, 0, 0)] for k in range(3)], axis=1)
-        matrix = np.stack(
-            [
-                np.stack([(k + 1) * jet[:, at(k + 1, 0, 0)], jet[:, at(k, 1, 0)], jet[:, at(k, 0, 1)]], axis=1)
-                for k in range(3)
-            ],
-            axis=1,
-        )
-        step = _solve_systems(matrix, -value)
+        along = [((k + 1) * jet[:, at(k + 1, 0, 0)], jet[:, at(k, 1, 0)], jet[:, at(k, 0, 1)]) for k in range(3)]
+        matrix = np.stack([np.stack(row, axis=1) for row in along], axis=1)
+        step = _solve_systems(matrix, -jet[:, [at(k, 0, 0) for k in range(3)]])
         size = np.abs(step).max(axis=1)
         far = ~(size < 1.0)
         z[i] += np.where(far[:, None], np.nan, step)
@@ -270,24 +266,34 @@ def _cusp_height(curve: Curve, k: int) -> float:
     return float(between(curve, k, a / (a - b))[2])
 
 
-def solve_at(z: Array, lam: Array, w_f: Array, parallel: bool = False) -> tuple[Array, Array, NDArray[np.int64]]:
-    """Folds at the drags of the guesses z: the same columns, relative errors of gamma, statuses; nan rows pass."""
+def solve_at(
+    z: Array, lam: Array, w_f: Array, parallel: bool = False, settled_at: float = SETTLED
+) -> tuple[Array, Array, NDArray[np.int64]]:
+    """Folds at the drags of the guesses z: the same columns, relative errors of gamma, statuses; nan rows pass.
+
+    Newton's last step is at most `settled_at`, in log r and log gamma.
+    """
     z = z.copy()
     error, codes = np.full(len(z), np.nan), np.full(len(z), status.NOT_CONVERGED)
     active = np.asarray(np.isfinite(z).all(axis=1))
     last = np.full(len(z), np.inf)
+    at = AT_DRAG.at
     for _ in range(3 * ROUNDS):
         i = np.flatnonzero(active)
         if not len(i):
             break
-        value, jacobian, _, sound = _residuals(z[i], lam[i], w_f[i], parallel)
-        step = _solve_systems(jacobian[:, :, :2], -value)
+        ends = shoot(np.exp(z[i, 0]), np.exp(z[i, 1]), _systems(lam[i], w_f[i], np.exp(z[i, 2])), AT_DRAG, parallel)
+        jet, along_gamma = ends.log_rho, ends.log_rho[:, at(0, 1, 0)]
+        sound = (ends.status == status.OK) & np.isfinite(jet).all(axis=1)
+        entries = (jet[:, at(1, 0, 0)], along_gamma, 2.0 * jet[:, at(2, 0, 0)], jet[:, at(1, 1, 0)])
+        jacobian = np.stack(entries, axis=1).reshape(-1, 2, 2)
+        step = _solve_systems(jacobian, -np.stack([jet[:, 0], jet[:, at(1, 0, 0)]], axis=1))
         size = np.abs(step).max(axis=1)
         far = ~sound | ~(size < 1.0)
         z[i, :2] += np.where(far[:, None], np.nan, step)
         # At a fold gamma depends on r to the second order only: gamma is done before r.
-        settled = ~far & ((size < SETTLED) | (np.abs(step[:, 1]) < SETTLED) & (size > 0.5 * last[i]) & (size < 1e-4))
-        rounding = ROUNDINGS * EPS / np.abs(jacobian[:, 0, 1])
+        settled = ~far & ((size < settled_at) | (np.abs(step[:, 1]) < SETTLED) & (size > 0.5 * last[i]) & (size < 1e-4))
+        rounding = ROUNDINGS * EPS / np.abs(along_gamma)
         error[i[settled]] = (np.abs(step[:, 1]) + rounding)[settled]
         codes[i[settled]] = status.OK
         last[i] = size

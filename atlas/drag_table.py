@@ -1,8 +1,8 @@
-"""Folds with drag from a file: what `atlas.build_drag` wrote. Needs numpy and netCDF4 only.
+"""Folds with drag from an atlas: what `atlas.build_drag` wrote. Needs numpy and netCDF4 only.
 
-Chebyshev series in log(lambda), log(1 + w_f / W_SCALE) and sigma, with C = C*_n (1 - sigma^2): on sigma > 0 the pair
-appears, from the vacuum at 1 to the cusp at 0, on sigma < 0 it ends. The curve of folds is smooth through the cusp in
-sigma, where gamma as a function of C has its two branches meet.
+Chebyshev series in log(lambda), log(1 + w_f / (W_SHARE lambda)) and sigma, with C = C*_n (1 - sigma^2): on sigma > 0
+the pair appears, from the vacuum at 1 to the cusp at 0, on sigma < 0 it ends. The curve of folds is smooth through the
+cusp in sigma, where gamma as a function of C has its two branches meet.
 """
 
 import os
@@ -14,18 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from atlas.checks import check_broadcast, check_order, check_outside, check_positive_finite, check_real
-from atlas.interpolant import W_SCALE, polynomials
-from atlas.lookup import INTERPOLANT, open_group, read_root
+from atlas.interpolant import polynomials
+from atlas.lookup import default_path, open_group, read_root
 from atlas.seal import AtlasFileError
 from kernels import status
 
 Array = NDArray[np.float64]
+# Fish weight over that of the cable at which its coordinate turns from linear to logarithmic.
+W_SHARE = 0.01
 FIELDS = ("gamma", "r_f")
-
-
-def default_drag_path() -> Path:
-    """The file of drag folds used when none is named: $TOWATLAS_DRAG_FILE, else build/drag.nc."""
-    return Path(os.environ.get("TOWATLAS_DRAG_FILE", "build/drag.nc"))
+DRAG_GROUP = "support/drag"
 
 
 @dataclass(frozen=True)
@@ -42,9 +40,10 @@ class DragAxes:
         low, high = np.log(self.lam_min), np.log(self.lam_max)
         return np.clip((2.0 * np.log(lam) - low - high) / (high - low), -1.0, 1.0)
 
-    def y(self, w_f: Array) -> Array:
-        """Coordinate of w_f."""
-        return np.clip(2.0 * np.log1p(w_f / W_SCALE) / np.log1p(self.w_f_max / W_SCALE) - 1.0, -1.0, 1.0)
+    def y(self, w_f: Array, lam: Array) -> Array:
+        """Coordinate of w_f on a cable of length lambda."""
+        scale = W_SHARE * lam
+        return np.clip(2.0 * np.log1p(w_f / scale) / np.log1p(self.w_f_max / scale) - 1.0, -1.0, 1.0)
 
     def s(self, sigma: Array) -> Array:
         """Coordinate of sigma."""
@@ -55,9 +54,10 @@ class DragAxes:
         low, high = np.log(self.lam_min), np.log(self.lam_max)
         return np.exp(0.5 * (low + high + x * (high - low)))
 
-    def w_f(self, y: Array) -> Array:
+    def w_f(self, y: Array, lam: Array) -> Array:
         """w_f at coordinate y; exactly 0 at y = -1."""
-        return W_SCALE * np.expm1(0.5 * (y + 1.0) * np.log1p(self.w_f_max / W_SCALE))
+        scale = W_SHARE * lam
+        return scale * np.expm1(0.5 * (y + 1.0) * np.log1p(self.w_f_max / scale))
 
     def sigma(self, s: Array) -> Array:
         """sigma at coordinate s."""
@@ -88,6 +88,11 @@ class DragLookup:
     status_ends: NDArray[np.int8]
 
 
+def block_of(coordinate: Array, blocks: int) -> NDArray[np.int64]:
+    """Which block of the error map a coordinate in [-1, 1] lies in."""
+    return np.minimum((0.5 * (coordinate + 1.0) * blocks).astype(np.int64), blocks - 1)
+
+
 def evaluate(series: Array, s: Array, y: Array, x: Array) -> Array:
     """Sum of a series of shape (s, y, x) at points, all of shape (points,)."""
     along = np.einsum("kji,ip->kjp", series, polynomials(x, series.shape[2]), optimize=False)
@@ -96,21 +101,21 @@ def evaluate(series: Array, s: Array, y: Array, x: Array) -> Array:
 
 
 def open_drag(path: str | os.PathLike | None = None) -> "DragTable":
-    """Open a file of drag folds and check that it is whole.
+    """Open the folds with drag of an atlas and check that it is whole.
 
     Parameters
     ----------
     path : path, optional
-        The file; without it $TOWATLAS_DRAG_FILE, else build/drag.nc, which `towatlas build --drag` makes.
+        An atlas made by `towatlas build --drag`; without it $TOWATLAS_FILE, else build/atlas.nc.
 
     Raises
     ------
     FileNotFoundError
         If there is no such file.
     AtlasFileError
-        If the file is damaged, is of another kind, or was written by a newer version.
+        If the file is damaged, holds no folds with drag, or was written by a newer version.
     """
-    return DragTable(default_drag_path() if path is None else Path(path))
+    return DragTable(default_path() if path is None else Path(path))
 
 
 class DragTable:
@@ -119,16 +124,19 @@ class DragTable:
     def __init__(self, path: Path):
         self.path = path
         self.attributes, data, self.sha256 = read_root(path)
-        if self.attributes.get("method") != "drag":
-            raise AtlasFileError(f"{path} holds no folds with drag; `towatlas build --drag` makes a file that does")
         with open_group(path, data) as file:
-            group = file[INTERPOLANT]
+            try:
+                group = file[DRAG_GROUP]
+            except IndexError:
+                raise AtlasFileError(
+                    f"{path} holds no folds with drag; `towatlas build --drag` makes an atlas that does"
+                ) from None
             names = ("lam_min", "lam_max", "w_f_max", "sigma_min")
             self.axes = DragAxes(**{name: float(group.getncattr(name)) for name in names})
-            self._series = {name: np.asarray(group[f"{name}_series"][:], np.float64) for name in FIELDS}
-            self._cusp = np.asarray(group["C_cusp_series"][:], np.float64)
-            self._error = np.asarray(group["gamma_error"][:], np.float64)
-            self._cusp_error = np.asarray(group["C_cusp_error"][:], np.float64)
+            self._series = {name: np.asarray(group[f"drag_{name}_series"][:], np.float64) for name in FIELDS}
+            self._cusp = np.asarray(group["drag_C_cusp_series"][:], np.float64)
+            self._error = np.asarray(group["drag_gamma_error"][:], np.float64)
+            self._cusp_error = np.asarray(group["drag_C_cusp_error"][:], np.float64)
         self.n_max = len(self._cusp)
 
     def folds(
@@ -177,11 +185,12 @@ class DragTable:
         codes, codes_ends = np.full(len(n), status.OUTSIDE), np.full(len(n), status.OUTSIDE)
         for order in np.unique(n[inside]):
             i = np.flatnonzero(inside & (n == order))
-            y, x = axes.y(w_f[i]), axes.x(lam[i])
+            y, x = axes.y(w_f[i], lam[i]), axes.x(lam[i])
             cusp = np.exp(evaluate(self._cusp[order - 1][None], np.zeros(len(i)), y, x))
-            table["C_cusp"][i], table["error_cusp"][i] = cusp, self._cusp_error[order - 1]
-            table["error"][i] = self._error[order - 1]
-            margin = self._cusp_error[order - 1]
+            blocks = self._error.shape[1]
+            block = order - 1, block_of(y, blocks), block_of(x, blocks)
+            margin = self._cusp_error[block]
+            table["C_cusp"][i], table["error_cusp"][i], table["error"][i] = cusp, margin, self._error[block]
             above = c[i] > cusp * (1.0 + margin)
             codes[i[above]] = codes_ends[i[above]] = status.NO_PAIR
             sigma = np.sqrt(np.maximum(1.0 - c[i] / cusp, 0.0))

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from atlas.commands.common import OK, threads
-from atlas.drag_table import default_drag_path
 from atlas.lookup import default_path
 from atlas.table import DEFAULT_PATH
 
@@ -17,8 +16,7 @@ def add(commands: Any) -> None:
         "--out",
         type=Path,
         metavar="FILE",
-        help=f"default {default_path()}, {DEFAULT_PATH} for --equilibria, {default_drag_path()} for --drag, "
-        "build/scan.nc for --method scan",
+        help=f"default {default_path()}, {DEFAULT_PATH} for --equilibria, build/scan.nc for --method scan",
     )
     parser.add_argument(
         "--equilibria",
@@ -28,7 +26,7 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--drag",
         action="store_true",
-        help="a table of folds with drag instead: where pairs of equilibria appear and end; takes some minutes",
+        help="put folds with drag into the atlas too: where pairs of equilibria appear and end; takes some minutes",
     )
     parser.add_argument(
         "--method",
@@ -44,6 +42,8 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     how = {"threads": options.threads, "progress": not options.quiet}
     if options.equilibria:
+        if options.drag:
+            raise ValueError("--drag and --equilibria make two files: build one after the other")
         if options.method:
             raise ValueError("--method says how critical speeds are found; a table of --equilibria has one method")
         from atlas.build_equilibria import build_equilibria
@@ -51,11 +51,11 @@ def _run(options: argparse.Namespace) -> int:
         print(build_equilibria(options.out or DEFAULT_PATH, **how))
         return OK
     if options.drag:
-        if options.method:
-            raise ValueError("--method says how critical speeds are found; a table with --drag has one method")
+        if options.method == "scan":
+            raise ValueError("--drag belongs in an atlas of method fold")
         from atlas.build_drag import build_drag
 
-        print(build_drag(options.out or default_drag_path(), **how))
+        print(build_drag(options.out or default_path(), **how))
         return OK
     from atlas.build import build_atlas
 

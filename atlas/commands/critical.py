@@ -3,7 +3,6 @@
 import argparse
 import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from atlas.commands.common import (
 )
 from atlas.critical import CriticalStates, solve_critical
 from atlas.drag_folds import solve_drag_folds
-from atlas.drag_table import default_drag_path, open_drag
+from atlas.drag_table import open_drag
 from atlas.limits import transitions, unchecked_threshold_length
 from atlas.lookup import Atlas, open_atlas
 from atlas.nomenclature import REPORT, SYMBOLS
@@ -50,10 +49,8 @@ def add(commands: Any) -> None:
         "--C",
         type=drag,
         metavar="C",
-        help="with drag: its constant (1/2) rho C_D d R / (mu + rho A); from --drag-file, or solved with --solve",
-    )
-    parser.add_argument(
-        "--drag-file", type=Path, metavar="FILE", help=f"made by `towatlas build --drag`; default {default_drag_path()}"
+        help="with drag: its constant (1/2) rho C_D d R / (mu + rho A); from an atlas made by "
+        "`towatlas build --drag`, or solved with --solve",
     )
     add_atlas(parser)
     parser.add_argument(
@@ -90,7 +87,7 @@ def _run_drag(options: argparse.Namespace) -> int:
         announce_compilation("shoot_drag", 10)
         folds: Any = solve_drag_folds(*cable)
     else:
-        folds = open_drag(options.drag_file).folds(*cable, outside="nan")
+        folds = open_drag(options.atlas).folds(*cable, outside="nan")
     words = status.FLAG_MEANINGS.split()
     names = ("appears", "ends", "C_cusp", "error")
     rows = [
@@ -113,7 +110,7 @@ def _run_drag(options: argparse.Namespace) -> int:
     if (codes == status.OK).any():
         return OK
     if (codes == status.OUTSIDE).any():
-        say("outside the file of folds with drag; --solve computes such points directly")
+        say("outside the folds with drag of the atlas; --solve computes such points directly")
         return OUTSIDE
     say(f"no pair: {status.SENTENCES[int(codes[0])] if len(codes) else status.SENTENCES[status.NO_TRANSITION]}")
     return NO_STATE if not len(codes) or (codes != status.NOT_CONVERGED).any() else FAILED
