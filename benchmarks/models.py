@@ -12,22 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from atlas import report
 from atlas.answers import SceneAnswer, answer_scene
 from atlas.models import QUESTIONS, Choice, choose, compare
 from atlas.scene import MODELS, read_scene
 
 DOCS = Path(__file__).parent.parent / "docs"
 # Scene, gamma and nodes of each photograph (NRL Report 7048, Figs. 3 to 5).
-PHOTOGRAPHS = (
-    ("skop-fig3", 1.64, 1),
-    ("skop-fig3", 2.97, 1),
-    ("skop-fig3", 5.94, 2),
-    ("skop-fig4", 2.46, 2),
-    ("skop-fig4", 4.77, 3),
-    ("skop-fig5", 2.60, 2),
-    ("skop-fig5", 4.77, 2),
-    ("skop-fig5", 7.23, 3),
-)
+PHOTOGRAPHS = tuple((f"skop-fig{p.figure[0]}", p.gamma, p.nodes) for p in report.PHOTOGRAPHS)
 HANGS = ("nodes", "position", "tension")
 TOLERANCES = (0.01, 0.1)
 COLUMNS = (

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import reference_drag
 from test_cli import run
-from test_drag import PHOTOGRAPHS
 from test_scene import changed
 
 import atlas
@@ -23,10 +22,10 @@ from atlas.drag_shots import System
 from atlas.model_folds import ModelFolds, follow_folds, model_folds
 from atlas.models import QUESTIONS, check_questions, choose, compare, least_model, solvable_models, solve_model
 from atlas.placement import cables_to_depth, needs_lanes
+from atlas.report import PHOTOGRAPHS
 from atlas.scene import make_scene, read_scene
 from benchmarks import models
 
-FIGURES = {(37.8, 1352): "skop-fig3", (52.4, 1352): "skop-fig4", (52.4, 1571): "skop-fig5"}
 HANGS = ("nodes", "position", "tension")
 PAGE = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text()
 PAGE_SCENE = PAGE.split("```toml\n")[1].split("```")[0]
@@ -36,9 +35,9 @@ PAGE_SCENE = PAGE.split("```toml\n")[1].split("```")[0]
 def photographs():
     """Scene, nodes photographed, and the answers of two models, without critical speeds."""
     rows = []
-    for lam, w_f, gamma, photographed, _ in PHOTOGRAPHS:
-        scene = read_scene(FIGURES[lam, w_f]).at(gamma=gamma)
-        rows.append((scene, photographed, [solve_model(scene, model) for model in ("vacuum", "air")]))
+    for photograph in PHOTOGRAPHS:
+        scene = read_scene(f"skop-fig{photograph.figure[0]}").at(gamma=photograph.gamma)
+        rows.append((scene, photograph.nodes, [solve_model(scene, model) for model in ("vacuum", "air")]))
     return rows
 
 
