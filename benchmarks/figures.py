@@ -117,7 +117,7 @@ def folds(rows: list[Row], path: Path) -> None:
         "lookup from the atlas": ("lookup\nfrom the atlas", (0, 9), "center"),
     }
     # Where the share of lost answers stands: beside the symbols of its method that the others leave free.
-    sides = {"Skop's scan": ((0, -19), "center"), "SciPy solve_bvp": ((-10, -3), "right")}
+    sides = {"Skop's scan": ((0, -19), "center"), "SciPy solve_ivp + root": ((-10, -3), "right")}
     colours = {line.get_label(): line.get_color() for line in axes.get_lines()}
     for row in rows:
         place = (row.microseconds, max(row.quantile("gamma", 0.99), FLOOR))
