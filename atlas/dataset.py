@@ -75,57 +75,61 @@ def plain_table(
     )
 
 
-def root_attributes(method: str, extra: dict[str, Any]) -> dict[str, Any]:
-    """Global attributes that say what the file is."""
+def _attributes(title: str, source: str, comment: str, method: str, extra: dict[str, Any]) -> dict[str, Any]:
     return {
         "Conventions": "CF-1.11",
-        "title": "Critical speeds of a cable towed in a circle, in a vacuum",
+        "title": title,
         "institution": "towatlas",
-        "source": f"towatlas, method {method}",
+        "source": source,
         "references": f"{REPORT}, On the Shape of a Cable Towed in a Circular Path",
-        "comment": "gamma_c[n, w_f, lam] is the speed Omega sqrt(R/g) at which the n-th pair of equilibria appears; "
-        "missing where lam <= lambda_c = 2 n - 1 + sqrt(1 + w_f^2) - w_f (status no_transition), and where another "
-        "status says why. All quantities are dimensionless: lengths over the tow radius R, forces over "
-        "(mu + rho A) g R, with mu the mass of the cable and rho A that of the fluid it displaces, per unit length, "
-        "g gravity and Omega the rotation of the tow point. At the tow point x = 1, outwards positive; z is positive "
-        "downwards from it. Between grid points interpolate logarithms in log(lam - lambda_c) and log(w_f).",
+        "comment": comment,
         "method": method,
         **extra,
     }
 
 
+def root_attributes(method: str, extra: dict[str, Any]) -> dict[str, Any]:
+    """Global attributes that say what the file is."""
+    return _attributes(
+        "Critical speeds of a cable towed in a circle, in a vacuum",
+        f"towatlas, method {method}",
+        "gamma_c[n, w_f, lam] is the speed Omega sqrt(R/g) at which the n-th pair of equilibria appears; "
+        "missing where lam <= lambda_c = 2 n - 1 + sqrt(1 + w_f^2) - w_f (status no_transition), and where another "
+        "status says why. All quantities are dimensionless: lengths over the tow radius R, forces over "
+        "(mu + rho A) g R, with mu the mass of the cable and rho A that of the fluid it displaces, per unit length, "
+        "g gravity and Omega the rotation of the tow point. At the tow point x = 1, outwards positive; z is positive "
+        "downwards from it. Between grid points interpolate logarithms in log(lam - lambda_c) and log(w_f).",
+        method,
+        extra,
+    )
+
+
 def equilibria_attributes(extra: dict[str, Any]) -> dict[str, Any]:
     """Global attributes of a table of equilibria."""
-    return {
-        "Conventions": "CF-1.11",
-        "title": "Equilibria of a cable towed in a circle, in a vacuum",
-        "institution": "towatlas",
-        "source": "towatlas, equilibria by the count of zeros of the first variation",
-        "references": f"{REPORT}, On the Shape of a Cable Towed in a Circular Path",
-        "comment": "Of the 2 k + 1 equilibria of a cable, k the number of its critical speeds below gamma, two are "
+    return _attributes(
+        "Equilibria of a cable towed in a circle, in a vacuum",
+        "towatlas, equilibria by the count of zeros of the first variation",
+        "Of the 2 k + 1 equilibria of a cable, k the number of its critical speeds below gamma, two are "
         "tabulated: the median one, with k nodes, that the report expects to be seen, and the one without nodes that "
         "swings outward. They are one until the first critical speed. The median branch jumps at every critical "
         "speed, where nodes changes: do not interpolate between points of different nodes. All quantities are "
         "dimensionless: lengths over the tow radius R, forces over (mu + rho A) g R.",
-        "method": METHOD,
-        **extra,
-    }
+        METHOD,
+        extra,
+    )
 
 
 def shape_attributes(facts: dict[str, Any]) -> dict[str, Any]:
     """Global attributes of the shape of one equilibrium."""
-    return {
-        "Conventions": "CF-1.11",
-        "title": "Shape of a cable towed in a circle, in a vacuum",
-        "institution": "towatlas",
-        "source": "towatlas, shots from the fish up",
-        "references": f"{REPORT}, On the Shape of a Cable Towed in a Circular Path",
-        "comment": "Dimensionless: lengths over the tow radius R, forces over (mu + rho A) g R. At the tow point "
+    return _attributes(
+        "Shape of a cable towed in a circle, in a vacuum",
+        "towatlas, shots from the fish up",
+        "Dimensionless: lengths over the tow radius R, forces over (mu + rho A) g R. At the tow point "
         "s = 0, x = 1, z = 0; the fish is at s = lam. s_node and z_node are where the cable passes the axis. error "
         "is the estimated relative error of x_f.",
-        "method": "shape",
-        **facts,
-    }
+        "shape",
+        facts,
+    )
 
 
 def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
