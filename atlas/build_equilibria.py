@@ -155,27 +155,27 @@ def _march_in_speed(grid: EquilibriaGrid, critical: dict[str, Array], bar: tqdm)
         nodes[1, :, j] = np.sum(gamma_c < speed, axis=0)
         for k in range(len(BRANCHES)):
             n = nodes[k, :, j]
-            todo = np.arange(cables)
+            unsolved = np.arange(cables)
             if k == 1:
                 # Up to the first transition the two branches are one.
                 for name in FIELDS:
                     branches[name][1, :, j] = branches[name][0, :, j]
-                todo = np.flatnonzero(n > 0)
+                unsolved = np.flatnonzero(n > 0)
             guess = _extrapolated(np.abs(branches["x_f"][k]), grid.gamma, j)
             if k == 1 and j > 0:
                 new = np.flatnonzero(n != nodes[1, :, j - 1])
                 guess[new] = x_fold[n[new] - 1, new]
             members = solve_members(
-                w_f[todo],
-                lam[todo],
-                np.full(len(todo), speed),
-                n[todo],
-                np.zeros(len(todo), bool),
+                w_f[unsolved],
+                lam[unsolved],
+                np.full(len(unsolved), speed),
+                n[unsolved],
+                np.zeros(len(unsolved), bool),
                 shoot_lanes,
-                guess[todo] * speed**2,
+                guess[unsolved] * speed**2,
             )
             for name in FIELDS:
-                branches[name][k, todo, j] = getattr(members, name)
+                branches[name][k, unsolved, j] = getattr(members, name)
         bar.update(cables)
     shape = (len(BRANCHES), len(grid.w_f), len(grid.lam), speeds)
     return {name: values.reshape(shape) for name, values in (branches | {"nodes": nodes}).items()}
