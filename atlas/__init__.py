@@ -6,13 +6,14 @@ Importing this package, opening an atlas and looking a value up need numpy and n
 
 from atlas.answers import answer_scene, design
 from atlas.critical import CriticalStates, solve_critical
-from atlas.drag import DragEquilibria, DragShape, drag_shape
+from atlas.drag import DragEquilibria
 from atlas.drag_folds import DragFolds, solve_drag_folds
+from atlas.drag_shapes import DragShape, drag_shape
 from atlas.drag_table import DragLookup, DragTable, open_drag
 from atlas.equilibria import Equilibria, equilibria
 from atlas.limits import excess_length, massless_cable, threshold_length
 from atlas.lookup import Atlas, open_atlas
-from atlas.scene import read_scene
+from atlas.scene_file import read_scene
 from atlas.seal import AtlasFileError
 from atlas.shape import shape
 from atlas.table import EquilibriaTable, FishPositions, open_equilibria

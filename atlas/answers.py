@@ -193,7 +193,7 @@ def answer_scene(
 
     Examples
     --------
-    >>> from atlas.scene import read_scene
+    >>> from atlas.scene_file import read_scene
     >>> answer = answer_scene(read_scene("skop-fig3"), model="vacuum")
     >>> answer.equilibria.nodes[answer.equilibria.median]
     array([1])

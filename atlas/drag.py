@@ -98,61 +98,6 @@ def check_system(lam: float, w_f: float, C: float, m_f: float | None, C_f: float
     )
 
 
-@dataclass(frozen=True)
-class DragShape:
-    """One cable with drag at arc lengths `s` from the tow point over the tow radius; arrays of their shape.
-
-    x, y, z : position, the tow point at (1, 0, 0), moving along y, z downwards. R_x, R_y, R_z : force of the cable,
-    pointing down it. T : tension.
-    """
-
-    s: Array
-    x: Array
-    y: Array
-    z: Array
-    R_x: Array
-    R_y: Array
-    R_z: Array
-    T: Array
-
-
-def drag_shape(found: DragEquilibria, which: int, s: ArrayLike) -> DragShape:
-    """Shape and loads of one equilibrium at arc lengths of one's choice.
-
-    Parameters
-    ----------
-    found : DragEquilibria
-    which : int
-        Which of its equilibria.
-    s : array_like
-        Arc lengths from the tow point over the tow radius [-], 0 to lam.
-
-    Raises
-    ------
-    ValueError
-        For arc lengths off the cable and equilibria that are not there.
-
-    References
-    ----------
-    NRL Report 7048, Eqs. (20)-(23).
-    """
-    s = check_real("s", s)
-    if not ((s >= 0.0) & (s <= found.lam)).all():
-        raise ValueError(f"s must lie on the cable, 0 to {found.lam:g}")
-    if not 0 <= which < len(found):
-        raise ValueError(f"which must be 0 to {len(found) - 1}, got {which}")
-    gamma2 = found.gamma**2
-    share = np.append((found.lam - s.ravel()) / found.lam, 1.0)
-    _, points, codes = trace(found.r_f[which] * gamma2, found.gamma, found.system, share)
-    _checked(codes, found.system, found.gamma)
-    big_x, big_y, h, fx, fy, fz, tension, _ = points.T / gamma2
-    angle = np.arctan2(big_y[-1], big_x[-1])
-    turned = np.exp(-1j * angle)
-    position, force = (big_x + 1j * big_y) * turned, (fx + 1j * fy) * turned
-    columns = (position.real, position.imag, h[-1] - h, force.real, force.imag, fz, tension)
-    return DragShape(s, *(column[:-1].reshape(s.shape) for column in columns))
-
-
 def solve_drag_equilibria(system: System, gamma: float, vacuum_r_f: ArrayLike = ()) -> DragEquilibria:
     """Equilibria with drag; no checks.
 
@@ -186,7 +131,8 @@ def solve_drag_equilibria(system: System, gamma: float, vacuum_r_f: ArrayLike = 
     return _collect(system, gamma, np.exp(roots), searched)
 
 
-def _checked(ends_status: Integers, system: System, gamma: float) -> None:
+def raise_failures(ends_status: Integers, system: System, gamma: float) -> None:
+    """ArithmeticError with the sentence of the first shot that failed, if any did."""
     bad = ends_status[ends_status != status.OK]
     if len(bad):
         raise ArithmeticError(f"{system}, gamma = {gamma:g}: {status.SENTENCES[int(bad[0])]}")
@@ -195,7 +141,7 @@ def _checked(ends_status: Integers, system: System, gamma: float) -> None:
 def _shoot_slopes(system: System, gamma: float, x: Array) -> Array:
     """Rows X, Y at the tow point over the tow radius and their slopes in x = log r; then log rho and its slope."""
     ends = shoot(np.exp(x), gamma, system.row(), SLOPE)
-    _checked(ends.status, system, gamma)
+    raise_failures(ends.status, system, gamma)
     scale = gamma**-2
     return np.stack(
         [ends.X[:, 0] * scale, ends.Y[:, 0] * scale, ends.X[:, 1] * scale, ends.Y[:, 1] * scale, *ends.log_rho.T]
@@ -290,7 +236,7 @@ def _polish_extrema(system: System, gamma: float, x: Array) -> Array:
     start = x.copy()
     for _ in range(8 if len(x) else 0):
         ends = shoot(np.exp(x), gamma, system.row(), jets)
-        _checked(ends.status, system, gamma)
+        raise_failures(ends.status, system, gamma)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = -ends.log_rho[:, 1] / (2.0 * ends.log_rho[:, 2])
         x = x + np.where(np.isfinite(step), np.clip(step, -0.1, 0.1), 0.0)
@@ -335,7 +281,7 @@ def _continue(system: System, gamma: float, r: Array) -> Array:
         x = x + drift * np.log(share / previous)
         for _ in range(6):
             ends = shoot(np.exp(x), gamma, row, jets)
-            _checked(ends.status, system, gamma)
+            raise_failures(ends.status, system, gamma)
             with np.errstate(divide="ignore", invalid="ignore"):
                 step = -ends.log_rho[:, 0] / ends.log_rho[:, along_r]
                 drift = -ends.log_rho[:, along_drag] / ends.log_rho[:, along_r]

@@ -15,7 +15,8 @@ import numpy as np
 from atlas import report
 from atlas.answers import SceneAnswer, answer_scene
 from atlas.models import QUESTIONS, Choice, choose, compare
-from atlas.scene import MODELS, read_scene
+from atlas.scene import MODELS
+from atlas.scene_file import read_scene
 
 DOCS = Path(__file__).parent.parent / "docs"
 # Scene, gamma and nodes of each photograph (NRL Report 7048, Figs. 3 to 5).

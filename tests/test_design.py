@@ -10,7 +10,7 @@ import atlas
 from atlas.answers import design
 from atlas.branches import extrema, shoot_lanes, solve_members
 from atlas.placement import cables_to_depth
-from atlas.scene import read_scene
+from atlas.scene_file import read_scene
 
 SCAN = 300
 

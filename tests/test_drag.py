@@ -13,7 +13,8 @@ from scipy.integrate import solve_bvp, solve_ivp
 from test_cli import run
 
 import atlas
-from atlas.drag import drag_shape, solve_drag_equilibria
+from atlas.drag import solve_drag_equilibria
+from atlas.drag_shapes import drag_shape
 from atlas.drag_shots import System, shoot
 from atlas.jets import jets_of
 from atlas.report import PHOTOGRAPHS

@@ -23,7 +23,7 @@ from atlas.model_folds import ModelFolds, follow_folds, model_folds
 from atlas.models import QUESTIONS, check_questions, choose, compare, least_model, solvable_models, solve_model
 from atlas.placement import cables_to_depth, needs_lanes
 from atlas.report import PHOTOGRAPHS
-from atlas.scene import make_scene, read_scene
+from atlas.scene_file import make_scene, read_scene
 from benchmarks import models
 
 HANGS = ("nodes", "position", "tension")

@@ -16,8 +16,9 @@ import pytest
 from test_cli import run
 
 import atlas
-from atlas import answers, placement, scene, units
-from atlas.scene import MODELS, SceneFileError, make_scene, read_scene, shipped_scenes
+from atlas import answers, placement, scene_file, units
+from atlas.scene import MODELS
+from atlas.scene_file import SceneFileError, make_scene, read_scene, shipped_scenes
 from atlas.units import parse_quantity
 
 DOCS = Path(__file__).parent.parent / "docs" / "scenes.md"
@@ -42,7 +43,7 @@ def changed(**changes):
     return table
 
 
-@pytest.mark.parametrize("module", [answers, placement, scene, units])
+@pytest.mark.parametrize("module", [answers, placement, scene_file, units])
 def test_examples_in_docstrings(module):
     result = doctest.testmod(module)
     assert result.attempted > 0
@@ -369,7 +370,7 @@ def test_examples_of_the_page(atlas_path, tmp_path):
         assert done.returncode == 0, (command, done.stderr)
         said = "compiling, once after|lengths are by the vacuum model, which does not hold"
         assert all(re.search(said, line) for line in done.stderr.splitlines())
-    for section, keys in scene._KEYS.items():
+    for section, keys in scene_file._KEYS.items():
         for key in keys:
             assert re.search(rf"^\| `{section}{'.' if section else ''}{key}` \|", text, re.M), (section, key)
 

@@ -13,7 +13,8 @@ from atlas.commands.common import speed as dimensionless_speed
 from atlas.drag import DragEquilibria
 from atlas.lookup import Atlas, open_atlas
 from atlas.models import QUESTIONS, Choice, check_questions, percent
-from atlas.scene import KNOT, MODELS, Scene, read_scene, shipped_scenes
+from atlas.scene import KNOT, MODELS, Scene
+from atlas.scene_file import read_scene, shipped_scenes
 from kernels import status
 
 MEDIA = {"vacuum": "a vacuum", "air": "a nondense fluid", "water": "a dense fluid"}
