@@ -41,8 +41,10 @@ failures: install  ## map where methods fail, write the figure and the tables of
 check: install  ## ruff, types, import layers
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	rm -rf build/tree && mkdir -p build/tree/towatlas
+	ln -s $(CURDIR)/atlas/* $(CURDIR)/kernels build/tree/towatlas/
 	$(BIN)/mypy
-	$(BIN)/lint-imports
+	PYTHONPATH=build/tree $(BIN)/lint-imports
 
 figures: install  ## draw the figures of the README from build/atlas.nc, and of NRL Report 7048 (build/report.html)
 	@test -f $(ATLAS) || $(MAKE) --no-print-directory atlas

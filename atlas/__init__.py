@@ -4,19 +4,19 @@ Importing this package, opening an atlas and looking a value up need numpy and n
 (`solve_critical`) imports numba when it is first called.
 """
 
-from atlas.answers import answer_scene, design
-from atlas.critical import CriticalStates, solve_critical
-from atlas.drag import DragEquilibria
-from atlas.drag_folds import DragFolds, solve_drag_folds
-from atlas.drag_shapes import DragShape, drag_shape
-from atlas.drag_table import DragLookup, DragTable, open_drag
-from atlas.equilibria import Equilibria, equilibria
-from atlas.limits import excess_length, massless_cable, threshold_length
-from atlas.lookup import Atlas, open_atlas
-from atlas.scene_file import read_scene
-from atlas.seal import AtlasFileError
-from atlas.shape import shape
-from atlas.table import EquilibriaTable, FishPositions, open_equilibria
+from towatlas.limits import excess_length, massless_cable, threshold_length
+from towatlas.scene.answers import answer_scene, design
+from towatlas.scene.file import read_scene
+from towatlas.solve.critical import CriticalStates, solve_critical
+from towatlas.solve.drag_equilibria import DragEquilibria
+from towatlas.solve.drag_folds import DragFolds, solve_drag_folds
+from towatlas.solve.drag_shapes import DragShape, drag_shape
+from towatlas.solve.equilibria import Equilibria, equilibria
+from towatlas.solve.shapes import shape
+from towatlas.tables.critical import Atlas, open_atlas
+from towatlas.tables.drag_folds import DragLookup, DragTable, open_drag
+from towatlas.tables.fish import EquilibriaTable, FishPositions, open_equilibria
+from towatlas.tables.seal import AtlasFileError
 
 __version__ = "0.1.0"
 __all__ = [

@@ -1,7 +1,7 @@
-"""`python -m atlas`."""
+"""`python -m towatlas`."""
 
 import sys
 
-from atlas.cli import main
+from towatlas.cli import main
 
 sys.exit(main())

@@ -1,4 +1,4 @@
-"""The command line: `towatlas`, or `python -m atlas`.
+"""The command line: `towatlas`, or `python -m towatlas`.
 
 Exit codes: 0 ok, 1 the computation failed, 2 usage, 3 outside the atlas, 4 no such state, 5 a file that cannot be read
 or written.
@@ -7,10 +7,10 @@ or written.
 import argparse
 import sys
 
-from atlas import __version__
-from atlas.commands import build, critical, design, equilibria, fish, info, plot, report, scene, shape
-from atlas.commands.common import FAILED, FILE, OK, USAGE, say
-from atlas.seal import AtlasFileError
+from towatlas import __version__
+from towatlas.commands import build, critical, design, equilibria, fish, info, plot, report, scene, shape
+from towatlas.commands.common import FAILED, FILE, OK, USAGE, say
+from towatlas.tables.seal import AtlasFileError
 
 # In the order in which help lists them.
 COMMANDS = (critical, equilibria, shape, fish, scene, design, build, plot, report, info)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from atlas.checks import check_broadcast, check_order, check_positive_finite, check_real
+from towatlas.checks import check_broadcast, check_order, check_positive_finite, check_real
 
 Array = NDArray[np.float64]
 

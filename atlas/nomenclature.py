@@ -3,6 +3,8 @@
 from dataclasses import dataclass, replace
 
 REPORT = "NRL Report 7048 (Skop 1970)"
+# The method of a file that holds a table of equilibria.
+EQUILIBRIA = "equilibria"
 
 
 @dataclass(frozen=True)

@@ -13,22 +13,22 @@ SCRIPT = """
 import json, time
 begin = time.perf_counter()
 import numpy as np
-import atlas
-times = {"import atlas": time.perf_counter() - begin}
+import towatlas
+times = {"import towatlas": time.perf_counter() - begin}
 
 def timed(name, call):
     start = time.perf_counter()
     call()
     times[name] = time.perf_counter() - start
 
-timed("first critical speed (solve_folds)", lambda: atlas.solve_critical(10.0, 1.0))
-timed("the same again", lambda: atlas.solve_critical(10.0, 1.0))
-timed("first curve (seed_folds)", lambda: atlas.solve_critical(np.geomspace(8, 50, 100), 1.0))
-timed("first table (solve_folds, parallel)", lambda: atlas.solve_critical(np.geomspace(8, 50, 300), 1.0))
-from kernels.scan import forward_shots, scan_system
+timed("first critical speed (solve_folds)", lambda: towatlas.solve_critical(10.0, 1.0))
+timed("the same again", lambda: towatlas.solve_critical(10.0, 1.0))
+timed("first curve (seed_folds)", lambda: towatlas.solve_critical(np.geomspace(8, 50, 100), 1.0))
+timed("first table (solve_folds, parallel)", lambda: towatlas.solve_critical(np.geomspace(8, 50, 300), 1.0))
+from towatlas.kernels.scan import forward_shots, scan_system
 one, out = np.ones(1), [np.empty(1) for _ in range(3)]
 timed("forward_shots", lambda: forward_shots(one, one, one, one, 10, *out, 0, 1))
-timed("first equilibria of a cable", lambda: atlas.equilibria(37.8, 1352, gamma=5.94))
+timed("first equilibria of a cable", lambda: towatlas.equilibria(37.8, 1352, gamma=5.94))
 found = np.empty((1, 4)), np.empty(1, np.int64)
 timed("scan_system", lambda: scan_system(1.0, 10.0, 0.3, 0.9, 8, 64, 10, 1, 1e-3, *found))
 print(json.dumps(times))
@@ -51,7 +51,7 @@ def measure() -> list[tuple[str, float, float]]:
 BUILD = """
 import resource, sys
 from pathlib import Path
-from atlas.build import build_atlas
+from towatlas.builders.critical import build_atlas
 summary = build_atlas(Path(sys.argv[1]), progress=False)
 print(summary.seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """

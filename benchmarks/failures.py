@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-import atlas
-from atlas.branches import shoot_lanes, solve_members
-from atlas.published import compare
-from kernels import status
-from kernels.sweeps import forward_shots_parallel
+import towatlas
+from towatlas.kernels import status
+from towatlas.kernels.sweeps import forward_shots_parallel
+from towatlas.report.published import compare
+from towatlas.solve.members import shoot_lanes, solve_members
 
 DOCS = Path(__file__).parent.parent / "docs"
 SEGMENTS, GUESSES = 100, 200
@@ -53,7 +53,7 @@ class Cell:
 def true_roots(w_f: float, lam: np.ndarray, gamma: np.ndarray) -> list[np.ndarray]:
     """R_x0 of all equilibria of each cable, in rising order."""
     order = int(np.ceil(lam.max() / 2)) + 1
-    folds = atlas.solve_critical(lam[:, None], w_f, np.arange(1, order + 1)).gamma
+    folds = towatlas.solve_critical(lam[:, None], w_f, np.arange(1, order + 1)).gamma
     passed = (gamma[:, None] > folds).sum(axis=1)
     rows = np.repeat(np.arange(len(lam)), 1 + 2 * passed)
     place = np.concatenate([np.arange(1 + 2 * k) for k in passed])
@@ -214,8 +214,8 @@ def _draw_critical_speeds(ax: Any, w_f: float, lam: np.ndarray, gamma: np.ndarra
     from matplotlib.patheffects import withStroke
 
     for n in ORDERS:
-        curve_lam = atlas.threshold_length(w_f, n) + np.geomspace(1e-3, lam[-1], 70)
-        curve = atlas.solve_critical(curve_lam, w_f, n).gamma
+        curve_lam = towatlas.threshold_length(w_f, n) + np.geomspace(1e-3, lam[-1], 70)
+        curve = towatlas.solve_critical(curve_lam, w_f, n).gamma
         drawn = (curve < 2 * gamma[-1]) & (curve > gamma[0] / 2) & (curve_lam < 1.3 * lam[-1])
         curve_lam, curve = curve_lam[drawn], curve[drawn]
         outline = [withStroke(linewidth=2.2, foreground="white", alpha=0.6)]

@@ -4,14 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-import atlas
-from atlas.limits import excess_length
-from atlas.lookup import Atlas
+import towatlas
 from benchmarks import peers_folds as peers
 from benchmarks.samples import FoldReference, cables, fold_reference
 from benchmarks.timing import LOST, Row, once, seconds
-from kernels.extract import solve_folds
-from kernels.scan import scan_system
+from towatlas.kernels.folds import solve_folds
+from towatlas.kernels.scan import scan_system
+from towatlas.limits import excess_length
+from towatlas.tables.critical import Atlas
 
 TABLE = 4000
 REFERENCE_METHOD = "direct, table"
@@ -28,8 +28,8 @@ def measure(table: Atlas, rows: int = 200, slow_rows: int = 16, full: bool = Tru
             REFERENCE_METHOD,
             f"{len(n)} cables, seeds included",
             rows,
-            {"gamma": exact.errors(atlas.solve_critical(exact.lam, exact.w_f, exact.n).gamma)},
-            seconds(lambda: atlas.solve_critical(lam, w_f, n), 3) / len(n) * 1e6,
+            {"gamma": exact.errors(towatlas.solve_critical(exact.lam, exact.w_f, exact.n).gamma)},
+            seconds(lambda: towatlas.solve_critical(lam, w_f, n), 3) / len(n) * 1e6,
         ),
         _one_by_one(exact),
         Row(

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-import atlas
-from atlas import interpolant
-from atlas.lookup import Atlas
+import towatlas
 from benchmarks.samples import SEED, cables
 from benchmarks.timing import Row, once, seconds
+from towatlas.numerics import chebyshev as interpolant
+from towatlas.tables.critical import Atlas
 
 POINTS = 100_000
 ORDER = 1  # the peers hold one n at a time
@@ -23,8 +23,8 @@ def measure(table: Atlas, points: int = POINTS) -> tuple[list[Row], dict[str, fl
     from scipy.interpolate import RectBivariateSpline, RegularGridInterpolator
 
     _, w_f, _ = cables(points)
-    lam = atlas.threshold_length(w_f, ORDER) + 10.0 ** np.random.default_rng(SEED).uniform(-3, 3, points)
-    exact = atlas.solve_critical(lam, w_f, ORDER).gamma
+    lam = towatlas.threshold_length(w_f, ORDER) + 10.0 ** np.random.default_rng(SEED).uniform(-3, 3, points)
+    exact = towatlas.solve_critical(lam, w_f, ORDER).gamma
     axes, series = table.axes, table.series("gamma", ORDER)
     x, y = interpolant.nodes(series.shape[1]), interpolant.nodes(series.shape[0])
     values = interpolant.tensor(series[None], x, y)[0]
@@ -33,7 +33,7 @@ def measure(table: Atlas, points: int = POINTS) -> tuple[list[Row], dict[str, fl
         """gamma from a peer that holds the smooth field: the same coordinates before and the same law after."""
 
         def speed(lam: np.ndarray, w_f: np.ndarray) -> np.ndarray:
-            excess = atlas.excess_length(lam, w_f, ORDER)
+            excess = towatlas.excess_length(lam, w_f, ORDER)
             return np.exp(evaluate(axes.x(excess), axes.y(w_f))) / np.sqrt(excess)
 
         return speed
@@ -90,7 +90,7 @@ def shell(path: Path, repeats: int = 5) -> dict[str, float]:
     python = sys.executable
     commands = {
         "towatlas critical --lam 37.8 --wf 1352 --n 2": [
-            *(python, "-m", "atlas", "critical", "--lam", "37.8", "--wf", "1352", "--n", "2", "--atlas", str(path))
+            *(python, "-m", "towatlas", "critical", "--lam", "37.8", "--wf", "1352", "--n", "2", "--atlas", str(path))
         ],
         "import numpy, netCDF4": [python, "-c", "import numpy, netCDF4"],
         "import numba, xarray": [python, "-c", "import numba, xarray"],
@@ -104,7 +104,7 @@ def shell(path: Path, repeats: int = 5) -> dict[str, float]:
 def whole_domain(table: Atlas, points: int = POINTS) -> dict[str, float]:
     """Largest relative difference of every quantity from the direct solution; share of error estimates that hold."""
     n, w_f, lam = cables(points)
-    found, exact = table.states(lam, w_f, n), atlas.solve_critical(lam, w_f, n)
+    found, exact = table.states(lam, w_f, n), towatlas.solve_critical(lam, w_f, n)
     names = ("gamma", "R_x0", "x_f", "z_f", "tension")
     worst = {name: float(np.abs(getattr(found, name) / getattr(exact, name) - 1).max()) for name in names}
     covered = np.abs(found.gamma / exact.gamma - 1) <= found.error + exact.error
@@ -114,7 +114,7 @@ def whole_domain(table: Atlas, points: int = POINTS) -> dict[str, float]:
 def open_or_build(path: Path) -> Atlas:
     """The atlas at a path, built there if there is none."""
     if not path.exists():
-        from atlas.build import build_atlas
+        from towatlas.builders.critical import build_atlas
 
         build_atlas(path, progress=False)
-    return atlas.open_atlas(path)
+    return towatlas.open_atlas(path)

@@ -1,6 +1,6 @@
 """Ways to integrate a shot, for comparison only: Runge-Kutta with fixed steps, of order 8, Taylor of other orders.
 
-Each takes the same start as the kernels (kernels.vacuum.start, the series at a bare tip) and returns (p, q).
+Each takes the same start as the kernels (towatlas.kernels.vacuum.start, the series at a bare tip) and returns (p, q).
 """
 
 from collections.abc import Callable
@@ -13,11 +13,11 @@ import numba
 import numpy as np
 from scipy.integrate._ivp import dop853_coefficients as dop853
 
-import kernels.shots
-from kernels import steppers
-from kernels.shots import END_COLUMNS, FOLD_COLUMNS
-from kernels.steppers import taylor_step
-from kernels.vacuum import boundary_error, forward_slopes, start
+import towatlas.kernels.lanes
+from towatlas.kernels import steppers
+from towatlas.kernels.lanes import END_COLUMNS, FOLD_COLUMNS
+from towatlas.kernels.steppers import taylor_step
+from towatlas.kernels.vacuum import boundary_error, forward_slopes, start
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 LANES = 32
@@ -28,7 +28,7 @@ E3, E5 = dop853.E3.copy(), dop853.E5.copy()
 Array = np.ndarray
 
 
-def march(a: Array, mu: Array, tau: Array, kernel: Callable = kernels.shots.march) -> tuple[Array, Array]:
+def march(a: Array, mu: Array, tau: Array, kernel: Callable = towatlas.kernels.lanes.march) -> tuple[Array, Array]:
     """The kernel of this project, to the end of the cable."""
     rows = len(a)
     ends, folds = np.empty((rows, END_COLUMNS)), np.empty((rows, 1, FOLD_COLUMNS))
@@ -45,12 +45,15 @@ def march_of_order(order: int, truncation: float = steppers.TRUNCATION) -> Calla
         step = steppers.make_taylor_step(order)
     finally:
         steppers.TRUNCATION = before
-    source = Path(kernels.shots.__file__).read_text()
+    source = Path(towatlas.kernels.lanes.__file__).read_text()
     module = ModuleType(f"shots_of_order_{order}")
-    module.__dict__["__file__"] = kernels.shots.__file__
+    module.__dict__["__file__"] = towatlas.kernels.lanes.__file__
     for old, new in (
-        ("from kernels.compiling import helper, inlined, kernel\n", "from kernels.compiling import helper, inlined\n"),
-        ("from kernels.steppers import taylor_step\n", ""),
+        (
+            "from towatlas.kernels.compiling import helper, inlined, kernel\n",
+            "from towatlas.kernels.compiling import helper, inlined\n",
+        ),
+        ("from towatlas.kernels.steppers import taylor_step\n", ""),
         ("@kernel\n", "@helper\n"),
     ):
         assert old in source
@@ -230,7 +233,7 @@ def order_8(a: Array, mu: Array, tau: Array, segments: int = 0, rtol: float = 0.
 
 @numba.njit(parallel=True)
 def scalar_forward_shots(w_f, lam, gamma, r_x0, segments, errors):
-    """Skop's forward shots, one after the other in a parallel loop: what kernels.scan.forward_shots is measured by."""
+    """Skop's forward shots, one after the other in a parallel loop: what `forward_shots` is measured by."""
     for i in numba.prange(len(w_f)):
         x, force = 1.0, r_x0[i]
         gamma2, ds = gamma[i] * gamma[i], lam[i] / segments

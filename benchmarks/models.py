@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from atlas import report
-from atlas.answers import SceneAnswer, answer_scene
-from atlas.models import QUESTIONS, Choice, choose, compare
-from atlas.scene import MODELS
-from atlas.scene_file import read_scene
+from towatlas.report import page as report
+from towatlas.scene.answers import SceneAnswer, answer_scene
+from towatlas.scene.file import read_scene
+from towatlas.scene.models import QUESTIONS, Choice, choose, compare
+from towatlas.scene.scene import MODELS
 
 DOCS = Path(__file__).parent.parent / "docs"
 # Scene, gamma and nodes of each photograph (NRL Report 7048, Figs. 3 to 5).

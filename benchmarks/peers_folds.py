@@ -6,8 +6,8 @@ import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
 from scipy.optimize import root
 
-from atlas.limits import excess_length
-from kernels.extract import _first_guess
+from towatlas.kernels.folds import _first_guess
+from towatlas.limits import excess_length
 
 Array = np.ndarray
 MAX_NODES = 5000

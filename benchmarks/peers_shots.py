@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from kernels.vacuum import start
+from towatlas.kernels.vacuum import start
 
 Array = np.ndarray
 BATCH = 8
@@ -74,7 +74,7 @@ def cyrk_shots(a: Array, mu: Array, tau: Array, rtol: float) -> tuple[Array, Arr
 class Heyoka:
     """heyoka's Taylor integrator, one shot at a time or BATCH at once, in t or in sigma.
 
-    In sigma the equations are those of kernels.steppers, without root or division. With `event` a shot in sigma ends
+    In sigma the equations are those of the Taylor step, without root or division. With `event` a shot in sigma ends
     where t says so; without, it is told its length, which a user would not know. Batches take shots sorted by their
     number of steps, so that no lane waits long for another; they know no event, which would stop all lanes at once.
     """

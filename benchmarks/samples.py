@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import atlas
+import towatlas
 
 ROOT = Path(__file__).parent.parent
 DATA = ROOT / "docs" / "data"
@@ -29,13 +29,13 @@ def cables(rows: int, seed: int = SEED) -> tuple[NDArray[np.int64], Array, Array
     rng = np.random.default_rng(seed)
     n = rng.integers(1, 7, rows)
     w_f = np.where(rng.random(rows) < 0.1, 0.0, 10.0 ** rng.uniform(-5, 4, rows))
-    return n, w_f, atlas.threshold_length(w_f, n) + 10.0 ** rng.uniform(-3, 3, rows)
+    return n, w_f, towatlas.threshold_length(w_f, n) + 10.0 ** rng.uniform(-3, 3, rows)
 
 
 def shots(rows: int, seed: int = SEED) -> tuple[Array, Array, Array]:
     """Random (a, mu, tau): random cables, at speeds within 2 of critical and fish offsets within 3 of the fold's."""
     n, w_f, lam = cables(rows, seed)
-    states = atlas.solve_critical(lam, w_f, n)
+    states = towatlas.solve_critical(lam, w_f, n)
     rng = np.random.default_rng(seed + 1)
     gamma = states.gamma * 2.0 ** rng.uniform(-1, 1, rows)
     return np.abs(states.x_f) * states.gamma**2 * 3.0 ** rng.uniform(-1, 1, rows), w_f * gamma**2, lam * gamma**2
@@ -141,7 +141,7 @@ def exact_folds(n: NDArray[np.int64], w_f: Array, lam: Array) -> list[dict[str, 
     from mpmath import mp
 
     slow = _mpmath_shots()
-    states = atlas.solve_critical(lam, w_f, n)
+    states = towatlas.solve_critical(lam, w_f, n)
     rows = []
     for i in range(len(n)):
         a = abs(float(states.x_f[i])) * float(states.gamma[i]) ** 2

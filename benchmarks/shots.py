@@ -8,8 +8,8 @@ from benchmarks import methods_shots as ours
 from benchmarks import peers_shots as peers
 from benchmarks.samples import ShotReference, shot_reference
 from benchmarks.timing import Row, once, seconds
-from kernels.scan import forward_shots
-from kernels.steppers import ORDER
+from towatlas.kernels.scan import forward_shots
+from towatlas.kernels.steppers import ORDER
 
 REFERENCE_METHOD = "Taylor, this project"
 

@@ -7,17 +7,17 @@ from pathlib import Path
 import numba
 import numpy as np
 
-import atlas
-from atlas.critical import solve_rows
-from atlas.limits import excess_length
-from atlas.seeds import seed
+import towatlas
 from benchmarks import methods_shots as methods
 from benchmarks import peers_folds
 from benchmarks.samples import shots
 from benchmarks.timing import Row, once, processor, seconds, versions
-from kernels.scan import forward_shots
-from kernels.shots import END_COLUMNS, FOLD_COLUMNS
-from kernels.sweeps import forward_shots_parallel, march_parallel, solve_folds_parallel
+from towatlas.kernels.lanes import END_COLUMNS, FOLD_COLUMNS
+from towatlas.kernels.scan import forward_shots
+from towatlas.kernels.sweeps import forward_shots_parallel, march_parallel, solve_folds_parallel
+from towatlas.limits import excess_length
+from towatlas.solve.critical import solve_rows
+from towatlas.solve.fold_seeds import seed
 
 RATIOS = Path(__file__).parent / "ratios.json"
 WORSE = 0.15  # a ratio that fell by more than this is named
@@ -102,7 +102,7 @@ def of_threads(rows: int = 20_000) -> list[Target]:
         "fish-up shots": lambda: march_parallel(a, mu, tau, *orders, 10**7, ends, folds, *codes),
         "forward shots": lambda: forward_shots_parallel(ones, lam, ones, -lam, 100, *out),
         "folds": lambda: solve_folds_parallel(n, w_f, lam, excess, *(column.copy() for column in guess), *folded),
-        "folds with their seeds": lambda: atlas.solve_critical(lam, w_f, n),
+        "folds with their seeds": lambda: towatlas.solve_critical(lam, w_f, n),
     }
     found, before = [], numba.get_num_threads()
     for name, call in calls.items():
@@ -137,8 +137,10 @@ def of_folds(points: int = 4000, peer_points: int = 12) -> list[Target]:
     numba.set_num_threads(1)
     curves = [(1, 1.0), (2, 10.0), (3, 100.0)]
     lam = np.geomspace(8.0, 50.0, points)
-    exact = {n: atlas.solve_critical(lam, w_f, n) for n, w_f in curves}
-    ours = np.mean([seconds(lambda n=n, w_f=w_f: atlas.solve_critical(lam, w_f, n), 3) for n, w_f in curves]) / points
+    exact = {n: towatlas.solve_critical(lam, w_f, n) for n, w_f in curves}
+    ours = (
+        np.mean([seconds(lambda n=n, w_f=w_f: towatlas.solve_critical(lam, w_f, n), 3) for n, w_f in curves]) / points
+    )
     error = max(float(states.error.max()) for states in exact.values())
     for tolerance in (1e-3, 1e-6, 1e-9):
         spent, worst, lost = 0.0, 0.0, 0

@@ -23,9 +23,9 @@ from math import log, sqrt
 
 import numpy as np
 
-from kernels import status
-from kernels.compiling import helper, kernel
-from kernels.series import FIRST, ORDER, PRODUCT, RATE, RATIO, ROOT, T, U, clear, march_of, reach, run, value
+from towatlas.kernels import status
+from towatlas.kernels.compiling import helper, kernel
+from towatlas.kernels.series import FIRST, ORDER, PRODUCT, RATE, RATIO, ROOT, T, U, clear, march_of, reach, run, value
 
 X, Y, H, FX, FY, FZ = range(FIRST, FIRST + 6)
 STATE = 8  # quantities up to here are marched, the rest are intermediate
@@ -289,8 +289,9 @@ def shoot_drag(
     """Shots begin..stop-1: fish at radius r[i], speed squared gamma2[i], cable systems[i]; lengths over g / Omega^2.
 
     systems : shape (rows, 7), columns lambda, w_f, m_f, C, C_f, w, C_t. shares : the part of the cable to shoot over.
-    jets, places, degree : of `atlas.jets`. trace : u, X, Y, h, F after each step of the last shot, as many as there is
-    room for. results : shape (rows, RESULT_ROWS, monomials), X, Y, h, F_x, F_y, F_z, T, log(rho / gamma^2) at the end.
+    jets, places, degree : of `towatlas.solve.jets`. trace : u, X, Y, h, F after each step of the last shot, as many as
+    there is room for. results : shape (rows, RESULT_ROWS, monomials), X, Y, h, F_x, F_y, F_z, T, log(rho / gamma^2) at
+    the end.
     """
     monomials = results.shape[2]
     c = np.zeros((QUANTITIES, monomials, ORDER + 1))

@@ -7,10 +7,10 @@ from math import sqrt
 
 import numpy as np
 
-from kernels import status
-from kernels.compiling import helper, inlined, kernel
-from kernels.steppers import rk4_forward
-from kernels.vacuum import boundary_error
+from towatlas.kernels import status
+from towatlas.kernels.compiling import helper, inlined, kernel
+from towatlas.kernels.steppers import rk4_forward
+from towatlas.kernels.vacuum import boundary_error
 
 LANES = 32
 ZOOM_GUESSES = 32  # shots across the window in which an extremum of E is looked for

@@ -2,8 +2,8 @@
 
 Every coefficient of the Taylor series in sigma is itself a short polynomial, a *jet*, in the unknowns of the problem:
 first and higher variations come out of the same recurrences as the solution, with no differences taken. A table of
-products says which pairs of monomials give which (`atlas.jets`); it is data, so one compiled kernel serves every kind
-of jet. Compiled in a tenth of the time of the lanes of kernels.shots, for who asks about few cables.
+products says which pairs of monomials give which (`towatlas.solve.jets`); it is data, so one compiled kernel serves
+every kind of jet. Compiled in a tenth of the time of kernels.lanes, for who asks about few cables.
 
 A set of equations is three functions, which `march_of` compiles the march with:
 
@@ -20,9 +20,9 @@ from math import exp, log, sqrt
 
 import numpy as np
 
-from kernels import status
-from kernels.compiling import helper
-from kernels.steppers import ORDER, TRUNCATION
+from towatlas.kernels import status
+from towatlas.kernels.compiling import helper
+from towatlas.kernels.steppers import ORDER, TRUNCATION
 
 U, T, FIRST = 0, 1, 2
 EPS = 2.0**-52

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from kernels.compiling import inlined
-from kernels.vacuum import forward_slopes
+from towatlas.kernels.compiling import inlined
+from towatlas.kernels.vacuum import forward_slopes
 
 ORDER = 20
 # Bound on the last two Taylor terms over the local amplitude. Their sum with all later ones stays below rounding.

@@ -7,11 +7,11 @@ bit for any number of threads. One parallel call costs about a millisecond: for 
 import numba
 import numpy as np
 
-from kernels.compiling import parallel_kernel
-from kernels.drag import STATE, shoot_drag
-from kernels.extract import solve_folds
-from kernels.scan import forward_shots, scan_system
-from kernels.shots import march
+from towatlas.kernels.compiling import parallel_kernel
+from towatlas.kernels.drag import STATE, shoot_drag
+from towatlas.kernels.folds import solve_folds
+from towatlas.kernels.lanes import march
+from towatlas.kernels.scan import forward_shots, scan_system
 
 # Rows a block: enough to keep the lanes full, few enough to share the work out evenly.
 SHOTS_BLOCK = 256

@@ -9,13 +9,13 @@ the start t = mu = gamma^2 w_f, f = mu a, p = a:
 
     df/dt = p,   dp/dt = -f / r,   r = sqrt(t^2 + f^2)   (the tension)
 
-and in d(sigma) = dt / r, free of square roots and divisions (kernels.steppers). The first variation in `a` at fixed
+and in d(sigma) = dt / r, free of square roots and divisions (kernels/steppers.py). The first variation in `a` at fixed
 t is v = df/da, q = dp/da with dv/dt = q, dq/dt = -t^2 v / r^3. Depth above the fish: dz/dt = t / r.
 """
 
 from math import sqrt
 
-from kernels.compiling import inlined
+from towatlas.kernels.compiling import inlined
 
 # Below this ratio of mu to sqrt(1 + a^2) the fish is a first-order change of the bare tip: the error is its square.
 TINY_FISH = 1e-9

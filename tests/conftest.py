@@ -18,7 +18,7 @@ settings.load_profile("towatlas")
 
 @pytest.fixture(scope="session")
 def atlas_path(tmp_path_factory):
-    from atlas.build import build_atlas
+    from towatlas.builders.critical import build_atlas
 
     path = tmp_path_factory.mktemp("atlas") / "atlas.nc"
     build_atlas(path, progress=False)
@@ -27,7 +27,7 @@ def atlas_path(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def atlas_file(atlas_path):
-    from atlas import open_atlas
+    from towatlas import open_atlas
 
     return open_atlas(atlas_path)
 
@@ -35,7 +35,7 @@ def atlas_file(atlas_path):
 @pytest.fixture(scope="session")
 def equilibria_grid():
     """The default spacing on a part of its range, which holds cables of up to four folds."""
-    from atlas.grids import EquilibriaGrid
+    from towatlas.builders.grids import EquilibriaGrid
 
     return EquilibriaGrid(
         w_f=np.concatenate([[0.0], 10.0 ** np.linspace(-2, 2, 17)]),
@@ -46,7 +46,7 @@ def equilibria_grid():
 
 @pytest.fixture(scope="session")
 def equilibria_path(tmp_path_factory, equilibria_grid):
-    from atlas.build_equilibria import build_equilibria
+    from towatlas.builders.fish import build_equilibria
 
     path = tmp_path_factory.mktemp("equilibria") / "equilibria.nc"
     build_equilibria(path, grid=equilibria_grid, progress=False)

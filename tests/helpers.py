@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from atlas.limits import threshold_length
-from kernels.scan import forward_shots
-from kernels.shots import END_COLUMNS, FOLD_COLUMNS, march
-from kernels.sweeps import march_parallel
+from towatlas.kernels.lanes import END_COLUMNS, FOLD_COLUMNS, march
+from towatlas.kernels.scan import forward_shots
+from towatlas.kernels.sweeps import march_parallel
+from towatlas.limits import threshold_length
 
 
 @dataclass

@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-import atlas
-from atlas.cli import main
+import towatlas
+from towatlas.cli import main
 
 
 def run(capsys, *arguments):
@@ -31,7 +31,7 @@ def test_json(critical):
     (row,) = json.loads(out)
     assert list(row) == ["n", "lam", "w_f", "gamma", "R_x0", "x_f", "error", "status"]
     assert (row["n"], row["lam"], row["w_f"], row["status"]) == (2, 37.8, 1352, "computed")
-    exact = atlas.solve_critical(37.8, 1352, 2)
+    exact = towatlas.solve_critical(37.8, 1352, 2)
     for name in ("gamma", "R_x0", "x_f"):
         assert row[name] == pytest.approx(float(getattr(exact, name)), rel=1e-9)
     assert (code, err) == (0, "")
@@ -61,7 +61,7 @@ def test_solve_needs_no_atlas_and_has_no_last_n(capsys):
         capsys, "critical", "--lam", 100, "--wf", 1, "--n", 40, "--solve", "--json", "--atlas", "absent.nc"
     )
     assert code == 0
-    assert json.loads(out)[0]["gamma"] == pytest.approx(float(atlas.solve_critical(100, 1, 40).gamma), rel=1e-14)
+    assert json.loads(out)[0]["gamma"] == pytest.approx(float(towatlas.solve_critical(100, 1, 40).gamma), rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_files_that_cannot_be_read(capsys, tmp_path, atlas_path):
 
 
 def test_environment_names_the_atlas(atlas_path, tmp_path):
-    command = [sys.executable, "-m", "atlas", "critical", "--lam", "10", "--wf", "0"]
+    command = [sys.executable, "-m", "towatlas", "critical", "--lam", "10", "--wf", "0"]
     environment = os.environ | {"TOWATLAS_FILE": str(atlas_path)}
     done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
@@ -136,7 +136,7 @@ def test_info(capsys, atlas_path):
         "sha256",
     ):
         assert words in out
-    assert atlas.open_atlas(atlas_path).sha256 in out
+    assert towatlas.open_atlas(atlas_path).sha256 in out
 
 
 @pytest.mark.parametrize("ending", ["svg", "png"])
@@ -162,12 +162,12 @@ def test_plot_of_an_unknown_kind(capsys, atlas_path, tmp_path):
 def test_plotted_curves_are_the_atlas(atlas_file):
     import matplotlib.pyplot as plt
 
-    from atlas.plot import plot_critical
+    from towatlas.plot.critical import plot_critical
 
     curves = plot_critical(atlas_file, w_f=(0.0, 10.0), orders=(1, 2))
     assert len(curves) == 4
     lam, gamma = curves[3].get_data()
-    np.testing.assert_allclose(gamma, atlas.solve_critical(lam, 10.0, 2).gamma, rtol=1e-9)
+    np.testing.assert_allclose(gamma, towatlas.solve_critical(lam, 10.0, 2).gamma, rtol=1e-9)
     assert len({str(curve.get_linestyle()) + str(curve._dash_pattern) for curve in curves[:2]}) == 2
     plt.close("all")
     with pytest.raises(ValueError, match="at most 4 fish weights"):
@@ -191,7 +191,7 @@ def test_installed_command(tmp_path):
 
 def test_compilation_is_announced_once(tmp_path):
     """Who waits for a kernel the first time is told why, on stderr; the second time there is nothing to tell."""
-    command = [sys.executable, "-m", "atlas", "critical", "--solve", "--lam", "10", "--wf", "0", "--n", "1"]
+    command = [sys.executable, "-m", "towatlas", "critical", "--solve", "--lam", "10", "--wf", "0", "--n", "1"]
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     first, second = (subprocess.run(command, env=environment, capture_output=True, text=True) for _ in range(2))
     assert first.stdout == second.stdout

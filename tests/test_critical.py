@@ -10,9 +10,9 @@ from helpers import random_cables, shoot
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-import atlas
-from atlas.limits import excess_length, long_cable, massless_cable, threshold_length, threshold_offset
-from kernels import status
+import towatlas
+from towatlas.kernels import status
+from towatlas.limits import excess_length, long_cable, massless_cable, threshold_length, threshold_offset
 
 KNOWN = [
     (10, 0, 1, 0.4928896763325),
@@ -28,7 +28,7 @@ KNOWN = [
 @pytest.mark.parametrize(("lam", "w_f", "n", "gamma"), KNOWN)
 def test_known_values(lam, w_f, n, gamma):
     digits = len(str(gamma).split(".")[1])
-    assert float(atlas.solve_critical(lam, w_f, n).gamma) == pytest.approx(gamma, abs=0.6 * 10.0**-digits)
+    assert float(towatlas.solve_critical(lam, w_f, n).gamma) == pytest.approx(gamma, abs=0.6 * 10.0**-digits)
 
 
 def test_error_against_mpmath():
@@ -38,7 +38,7 @@ def test_error_against_mpmath():
         (4, 5.0, 9.0), (6, 3000.0, 25.0), (9, 0.3, 40.0), (3, 0.0, 1e5), (1, 10.0, 1e5),
     ]  # fmt: skip
     for n, w_f, lam in cables:
-        state = atlas.solve_critical(lam, w_f, n)
+        state = towatlas.solve_critical(lam, w_f, n)
         a = abs(float(state.x_f)) * float(state.gamma) ** 2
         _, error = reference.fold_error(n, w_f, lam, a, float(state.gamma))
         assert error <= float(state.error), (n, w_f, lam)
@@ -50,7 +50,7 @@ def test_guess_converges_everywhere():
     """The built-in guess leads to a solution for every cable of the domain and for n far beyond it."""
     for n_max, rows, seed in ((6, 20000, 1), (200, 2000, 2)):
         n, w_f, lam = random_cables(rows, seed, n_max)
-        states = atlas.solve_critical(lam, w_f, n)
+        states = towatlas.solve_critical(lam, w_f, n)
         assert set(states.status) == {status.OK}
         # That of lambda, and of the wave, whose amplitude may outgrow p.
         gamma2 = states.gamma**2
@@ -61,7 +61,7 @@ def test_guess_converges_everywhere():
 
 def test_guess_does_not_matter():
     """From wrong guesses (factors up to 3) the solver finds the same fold, because the shot counts its zeros."""
-    from atlas.critical import solve_rows
+    from towatlas.solve.critical import solve_rows
 
     n, w_f, lam = random_cables(2000, 7)
     excess = excess_length(lam, w_f, n)
@@ -106,7 +106,7 @@ def test_threshold_is_approached_as_an_inverse_square_root(n, w_f):
     """gamma_cn sqrt(lambda - lambda_cn) -> K_n(w_f), at the lambda_cn of the closed form and no other."""
     # The shorter the radius of the last turn, the fish's offset at the threshold, the nearer is near.
     excess = np.array([1e-4, 1e-3, 1e-2]) * float(threshold_offset(w_f))
-    from atlas.critical import solve_rows
+    from towatlas.solve.critical import solve_rows
 
     ones = np.ones(3)
     states = solve_rows(np.full(3, n), w_f * ones, threshold_length(w_f, n) + excess, excess)
@@ -123,13 +123,13 @@ def test_ever_closer_to_the_threshold():
     n, excess = rng.integers(1, 9, rows), 10 ** rng.uniform(-16, -3, rows)
     w_f = np.where(rng.random(rows) < 0.2, 0.0, 10 ** rng.uniform(-6, 4, rows))
     lam = threshold_length(w_f, n) + excess
-    states = atlas.solve_critical(lam, w_f, n)
+    states = towatlas.solve_critical(lam, w_f, n)
     assert set(states.status) == {status.OK, status.NO_TRANSITION, status.LOST_IN_ROUNDING}
     solved = states.status == status.OK
     assert (solved | (excess < 2e-10 * lam)).all()
     assert states.error[solved].max() < 2e-4
     # gamma sqrt(excess) is nearly constant there: its scatter between neighbours is the error.
-    nearby = atlas.solve_critical(lam[solved] * (1 + 4e-16), w_f[solved], n[solved])
+    nearby = towatlas.solve_critical(lam[solved] * (1 + 4e-16), w_f[solved], n[solved])
     change = nearby.gamma * np.sqrt(excess_length(nearby.lam, nearby.w_f, nearby.n))
     change /= states.gamma[solved] * np.sqrt(excess_length(lam, w_f, n)[solved])
     assert (np.abs(change - 1) <= states.error[solved] + nearby.error).all()
@@ -139,7 +139,7 @@ def test_ever_closer_to_the_threshold():
 @pytest.mark.parametrize("w_f", [0.0, 0.1, 10.0])
 def test_no_transition_at_or_below_the_threshold(n, w_f):
     threshold = float(threshold_length(w_f, n))
-    states = atlas.solve_critical([threshold * 0.999, np.nextafter(threshold, 0), threshold * 1.001], w_f, n)
+    states = towatlas.solve_critical([threshold * 0.999, np.nextafter(threshold, 0), threshold * 1.001], w_f, n)
     assert list(states.status[[0, 2]]) == [status.NO_TRANSITION, status.OK]
     assert states.status[1] in (status.NO_TRANSITION, status.LOST_IN_ROUNDING)
     assert np.isnan(states.gamma[:2]).all()
@@ -160,7 +160,7 @@ def test_long_cable_without_a_fish(n):
     exact = float(mp.besseljzero(0, n) ** 2 / 4)
     assert float(long_cable(n)) == pytest.approx(exact, rel=1e-14)
     lam = np.array([1e6, 8e6])
-    correction = atlas.solve_critical(lam, 0.0, n).gamma ** 2 * lam / exact - 1
+    correction = towatlas.solve_critical(lam, 0.0, n).gamma ** 2 * lam / exact - 1
     assert 0 < correction[1] < 0.05
     assert correction[0] / correction[1] == pytest.approx(4.0, rel=0.1)
 
@@ -174,7 +174,7 @@ def test_long_cable_with_a_heavy_fish(n, m):
         return mp.besselj(0, outer) * mp.bessely(2, inner) - mp.bessely(0, outer) * mp.besselj(2, inner)
 
     lam = np.array([1e6, 8e6])
-    value = atlas.solve_critical(lam, m * lam, n).gamma ** 2 * lam
+    value = towatlas.solve_critical(lam, m * lam, n).gamma ** 2 * lam
     exact = float(mp.findroot(cross, value[1] * (1 - 1e-4)))
     correction = value / exact - 1
     assert abs(correction[1]) < 0.01
@@ -184,14 +184,14 @@ def test_long_cable_with_a_heavy_fish(n, m):
 @pytest.mark.parametrize("lam", [1.3, 5.0, 200.0])
 def test_massless_cable(lam):
     """w_f -> infinity: gamma_c1 -> (lambda^(2/3) - 1)^(-3/4), the error falling as lambda / w_f."""
-    gamma = atlas.solve_critical(lam, np.array([1e5, 1e6, 1e8]), 1).gamma
+    gamma = towatlas.solve_critical(lam, np.array([1e5, 1e6, 1e8]), 1).gamma
     miss = np.abs(gamma / massless_cable(lam) - 1)
     assert miss[2] < 1e-7 * lam
     assert miss[0] / miss[1] == pytest.approx(10, rel=0.1)
 
 
 def test_weightless_fish_is_the_limit():
-    gamma = atlas.solve_critical(10.0, [0.0, 1e-300, 1e-14, 1e-10, 1e-6], 2).gamma
+    gamma = towatlas.solve_critical(10.0, [0.0, 1e-300, 1e-14, 1e-10, 1e-6], 2).gamma
     assert gamma[1:4] == pytest.approx(gamma[0], rel=1e-9)
     assert gamma[4] == pytest.approx(gamma[0], rel=1e-5)
     assert gamma[0] == gamma[1]
@@ -202,7 +202,7 @@ def test_state_solves_the_forward_problem():
     from helpers import boundary_error
 
     n, w_f, lam = 2, 20.0, 12.0
-    state = atlas.solve_critical(lam, w_f, n)
+    state = towatlas.solve_critical(lam, w_f, n)
     e = [boundary_error(w_f, lam, float(state.gamma), float(state.R_x0), k)[0] for k in (500, 1000, 2000)]
     scale = float(state.gamma) ** 2 * lam**2
     assert abs(e[2]) < 1e-9 * scale
@@ -214,7 +214,7 @@ def test_state_solves_the_forward_problem():
 @example(lam=60023.0, w_f=164572.0, n=40)
 @given(lam=st.floats(1e-3, 1e6), w_f=st.floats(0, 1e8), n=st.integers(1, 40))
 def test_any_cable_gets_a_state_or_a_reason(lam, w_f, n):
-    state = atlas.solve_critical(lam, w_f, n)
+    state = towatlas.solve_critical(lam, w_f, n)
     if state.status == status.OK:
         assert state.gamma > 0
         assert state.R_x0 < 0
@@ -247,25 +247,25 @@ def test_any_cable_gets_a_state_or_a_reason(lam, w_f, n):
 )
 def test_bad_input(lam, w_f, n, match):
     with pytest.raises(ValueError, match=match):
-        atlas.solve_critical(lam, w_f, n)
+        towatlas.solve_critical(lam, w_f, n)
 
 
 def test_types_and_shapes():
-    expected = atlas.solve_critical(10.0, 1.0, 1).gamma
-    assert atlas.solve_critical(np.int32(10), 1, np.int8(1)).gamma == expected
-    assert atlas.solve_critical(np.float32(10), np.float32(1), 1.0).gamma == expected
-    assert atlas.solve_critical([[10.0], [10.0]], [1.0, 1.0, 1.0], 1).gamma.shape == (2, 3)
-    assert atlas.solve_critical([], 1.0, 1).gamma.shape == (0,)
+    expected = towatlas.solve_critical(10.0, 1.0, 1).gamma
+    assert towatlas.solve_critical(np.int32(10), 1, np.int8(1)).gamma == expected
+    assert towatlas.solve_critical(np.float32(10), np.float32(1), 1.0).gamma == expected
+    assert towatlas.solve_critical([[10.0], [10.0]], [1.0, 1.0, 1.0], 1).gamma.shape == (2, 3)
+    assert towatlas.solve_critical([], 1.0, 1).gamma.shape == (0,)
 
 
 @pytest.mark.parametrize(
     ("function", "arguments", "match"),
     [
-        (atlas.threshold_length, (-3,), "w_f must be finite and not negative"),
-        (atlas.threshold_length, ("10",), "w_f must be a real number"),
-        (atlas.threshold_length, (1, 0), "n counts the transitions"),
-        (atlas.excess_length, (0, 1), "lam must be finite and positive"),
-        (atlas.excess_length, ([1, 2], [1, 2, 3]), "do not broadcast"),
+        (towatlas.threshold_length, (-3,), "w_f must be finite and not negative"),
+        (towatlas.threshold_length, ("10",), "w_f must be a real number"),
+        (towatlas.threshold_length, (1, 0), "n counts the transitions"),
+        (towatlas.excess_length, (0, 1), "lam must be finite and positive"),
+        (towatlas.excess_length, ([1, 2], [1, 2, 3]), "do not broadcast"),
     ],
 )
 def test_bad_input_of_closed_forms(function, arguments, match):
@@ -276,6 +276,6 @@ def test_bad_input_of_closed_forms(function, arguments, match):
 def test_a_solver_that_loses_its_way_does_not_blame_the_input():
     """Fish ten times heavier than the atlas holds, within 1e-9 of the threshold: solved, or not converged."""
     n, w_f = np.array([6, 2, 4]), np.array([86583.0, 93251.2, 78199.1])
-    states = atlas.solve_critical(threshold_length(w_f, n) + np.array([1.8e-9, 2.2e-10, 5.5e-10]), w_f, n)
+    states = towatlas.solve_critical(threshold_length(w_f, n) + np.array([1.8e-9, 2.2e-10, 5.5e-10]), w_f, n)
     assert set(states.status) <= {status.OK, status.NOT_CONVERGED, status.LOST_IN_ROUNDING}
     assert (np.isnan(states.gamma) == (states.status != status.OK)).all()

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from test_cli import run
 
-import atlas
-from atlas.answers import design
-from atlas.branches import extrema, shoot_lanes, solve_members
-from atlas.placement import cables_to_depth
-from atlas.scene_file import read_scene
+import towatlas
+from towatlas.scene.answers import design
+from towatlas.scene.file import read_scene
+from towatlas.solve.depths import cables_to_depth
+from towatlas.solve.members import extrema, shoot_lanes, solve_members
 
 SCAN = 300
 
@@ -52,7 +52,7 @@ def test_every_answer_is_an_equilibrium_and_none_is_missing():
         assert (found.lam <= longest).all()
         several += len(found) > 1
         for k in range(len(found)):
-            shapes = atlas.equilibria(float(found.lam[k]), w_f, gamma)
+            shapes = towatlas.equilibria(float(found.lam[k]), w_f, gamma)
             same = np.flatnonzero(shapes.nodes == found.nodes[k])
             at = same[np.argmin(np.abs(shapes.x_f[same] - found.x_f[k]))]
             # Near the birth of a pair its members part with the root of the length beyond it.
@@ -74,7 +74,7 @@ def test_every_answer_is_an_equilibrium_and_none_is_missing():
 
 @pytest.mark.parametrize(("lam", "w_f", "gamma"), [(37.8, 1352, 5.94), (30.0, 0.0, 1.5), (20.0, 3.0, 0.8)])
 def test_depths_of_all_shapes_lead_back(lam, w_f, gamma):
-    shapes = atlas.equilibria(lam, w_f, gamma)
+    shapes = towatlas.equilibria(lam, w_f, gamma)
     for k in range(len(shapes)):
         found = cables_to_depth(w_f, gamma, float(shapes.z_f[k]), 1.5 * lam)
         back = found.x_f * shapes.x_f[k] > 0
@@ -165,7 +165,7 @@ def test_shell(ask):
     groups = scene.groups("vacuum")
     for row in answer["cables"]:
         lam = row["length_m"] / scene.radius
-        speeds = atlas.solve_critical(lam, groups.w_f, range(1, 7)).gamma
+        speeds = towatlas.solve_critical(lam, groups.w_f, range(1, 7)).gamma
         nearest = int(np.argmin(np.abs(speeds - 2.97)))
         assert row["nearest_n"] == nearest + 1
         assert row["distance_gamma"] == pytest.approx(speeds[nearest] - 2.97, abs=1e-8)
@@ -173,7 +173,7 @@ def test_shell(ask):
         assert row["distance_m_s"] == pytest.approx(
             (speeds[nearest] - 2.97) * np.sqrt(scene.radius * 9.80665), abs=1e-8
         )
-        shapes = atlas.equilibria(lam, groups.w_f, 2.97)
+        shapes = towatlas.equilibria(lam, groups.w_f, 2.97)
         at = np.argmin(np.abs(shapes.x_f * scene.radius - row["x_f_m"]))
         assert shapes.z_f[at] * scene.radius == pytest.approx(0.635, rel=1e-10)
         assert row["median"] == shapes.median[at]
@@ -198,7 +198,7 @@ def test_none_is_an_answer(ask):
     assert "no cable up to 0.9 m" in json.loads(out)["reason"]
     scene = read_scene("skop-fig3")
     groups = scene.groups("vacuum")
-    deepest = atlas.equilibria(0.9 / scene.radius, groups.w_f, 2.97).z_f.max() * scene.radius
+    deepest = towatlas.equilibria(0.9 / scene.radius, groups.w_f, 2.97).z_f.max() * scene.radius
     assert f"the deepest of the longest one is at {deepest:.6g} m" in err
 
 

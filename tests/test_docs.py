@@ -12,7 +12,9 @@ import pytest
 ROOT = Path(__file__).parent.parent
 
 
-@pytest.mark.parametrize("module", ["atlas.critical", "atlas.equilibria", "atlas.limits", "atlas.shape"])
+@pytest.mark.parametrize(
+    "module", ["towatlas.solve.critical", "towatlas.solve.equilibria", "towatlas.limits", "towatlas.solve.shapes"]
+)
 def test_examples_in_docstrings(module):
     result = doctest.testmod(importlib.import_module(module), raise_on_error=False)
     assert result.attempted > 0

@@ -12,21 +12,21 @@ import reference_drag
 from scipy.integrate import solve_bvp, solve_ivp
 from test_cli import run
 
-import atlas
-from atlas.drag import solve_drag_equilibria
-from atlas.drag_shapes import drag_shape
-from atlas.drag_shots import System, shoot
-from atlas.jets import jets_of
-from atlas.report import PHOTOGRAPHS
-from kernels import drag as kernel
-from kernels import series as series_kernel
-from kernels import status
-from kernels.series import FIRST, ORDER
+import towatlas
+from towatlas.kernels import drag as kernel
+from towatlas.kernels import series as series_kernel
+from towatlas.kernels import status
+from towatlas.kernels.series import FIRST, ORDER
+from towatlas.report.page import PHOTOGRAPHS
+from towatlas.solve.drag_equilibria import solve_drag_equilibria
+from towatlas.solve.drag_shapes import drag_shape
+from towatlas.solve.drag_shots import System, shoot
+from towatlas.solve.jets import jets_of
 
 
 @cache
 def in_air(lam, w_f, gamma):
-    return atlas.equilibria(lam, w_f, gamma, C=0.018)
+    return towatlas.equilibria(lam, w_f, gamma, C=0.018)
 
 
 @pytest.mark.parametrize("photograph", PHOTOGRAPHS, ids=lambda photograph: photograph.figure)
@@ -77,14 +77,14 @@ def test_shots_agree_with_long_doubles():
 def test_vacuum_as_drag_vanishes():
     """The kernel with drag, without it, is the vacuum; at C = 0 the answer is the vacuum's own."""
     for lam, w_f, gamma in ((37.8, 1352, 5.94), (10, 0, 1.5), (2.5, 3, 0.7)):
-        vacuum = atlas.equilibria(lam, w_f, gamma)
-        assert np.array_equal(atlas.equilibria(lam, w_f, gamma, C=0, C_f=0, C_t=0, w=1, m_f=w_f).R_x0, vacuum.R_x0)
+        vacuum = towatlas.equilibria(lam, w_f, gamma)
+        assert np.array_equal(towatlas.equilibria(lam, w_f, gamma, C=0, C_f=0, C_t=0, w=1, m_f=w_f).R_x0, vacuum.R_x0)
         radii = np.sort(np.abs(vacuum.x_f))
         bare = solve_drag_equilibria(System(lam, w_f, w_f), gamma)
         np.testing.assert_allclose(bare.r_f, radii, rtol=1e-12)
         differences = []
         for c in (1e-8, 1e-10):
-            found = atlas.equilibria(lam, w_f, gamma, C=c)
+            found = towatlas.equilibria(lam, w_f, gamma, C=c)
             assert sorted(found.nodes) == sorted(vacuum.nodes)
             differences.append(np.abs(found.r_f / radii - 1.0).max())
         assert differences[1] < max(1e-12, 0.02 * differences[0])
@@ -101,7 +101,7 @@ def test_shell(capsys):
 
 
 def test_shape_ends_where_it_should():
-    found = atlas.equilibria(37.8, 1352, 2.97, C=0.018)
+    found = towatlas.equilibria(37.8, 1352, 2.97, C=0.018)
     shape = drag_shape(found, 0, [0.0, 20.0, 37.8])
     assert shape.x[0] == pytest.approx(1.0, abs=1e-12)
     assert shape.y[0] == pytest.approx(0.0, abs=1e-12)
@@ -121,7 +121,7 @@ def test_largest_deflection_as_photographed():
 def test_single_equilibrium_near_the_axis():
     """With the report's drag the second fold is gone: one shape near the axis, two with the cable stretched out."""
     for gamma in (1.6, 6.5):
-        found = atlas.equilibria(37.8, 1352, gamma, C=0.018)
+        found = towatlas.equilibria(37.8, 1352, gamma, C=0.018)
         assert (found.r_f < 1).sum() == 1
         assert (found.r_f > 36).sum() == 2
         assert len(found) == 3
@@ -132,10 +132,10 @@ FULL = System(12.0, 2.0, 3.0, C=0.3, C_f=0.2, w=0.8, C_t=0.05)
 
 def _full():
     s = FULL
-    return atlas.equilibria(s.lam, s.w_f, 0.8, C=s.C, m_f=s.m_f, C_f=s.C_f, w=s.w, C_t=s.C_t)
+    return towatlas.equilibria(s.lam, s.w_f, 0.8, C=s.C, m_f=s.m_f, C_f=s.C_f, w=s.w, C_t=s.C_t)
 
 
-@pytest.mark.parametrize("found", [_full, lambda: atlas.equilibria(8.0, 0.0, 1.1, C=0.05)])
+@pytest.mark.parametrize("found", [_full, lambda: towatlas.equilibria(8.0, 0.0, 1.1, C=0.05)])
 def test_balance_of_forces_and_moments(found):
     """The reaction at the tow point carries the loads of the whole cable and of the fish, and their moments."""
     found = found()
@@ -201,7 +201,7 @@ def test_straight_trailing_cable(w):
     sine = np.sqrt(1 - cosine**2)
     wrong = []
     for small in (1e-3, 1e-4):
-        found = atlas.equilibria(small, 0.0, np.sqrt(small), C=ratio / small, w=w)
+        found = towatlas.equilibria(small, 0.0, np.sqrt(small), C=ratio / small, w=w)
         assert len(found) == 1
         assert found.nodes[0] == 0
         offset = np.array([-found.y_f[0], found.z_f[0]]) / small
@@ -296,17 +296,17 @@ def test_what_a_shot_refuses():
 )
 def test_bad_systems(options, message):
     with pytest.raises(ValueError, match=message):
-        atlas.equilibria(**({"lam": 5, "w_f": 1, "gamma": 1, "C": 0.1} | options))
+        towatlas.equilibria(**({"lam": 5, "w_f": 1, "gamma": 1, "C": 0.1} | options))
 
 
 def test_bad_points_of_a_shape():
-    found = atlas.equilibria(5, 1, 1, C=0.1)
+    found = towatlas.equilibria(5, 1, 1, C=0.1)
     with pytest.raises(ValueError, match="on the cable, 0 to 5"):
         drag_shape(found, 0, [5.1])
     with pytest.raises(ValueError, match="which must be 0 to"):
         drag_shape(found, 17, [1.0])
     with pytest.raises(ValueError, match="give it a fish"):
-        atlas.equilibria(5, 0, 1, C=0.1, w=0)
+        towatlas.equilibria(5, 0, 1, C=0.1, w=0)
 
 
 def test_python_of_the_page_runs():

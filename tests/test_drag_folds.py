@@ -13,13 +13,13 @@ from test_cli import run
 from test_file import SMALL_GRID, SMALL_SCAN
 from tqdm import tqdm
 
-import atlas
-from atlas import build_drag as build_drag_module
-from atlas.build import build_atlas
-from atlas.build_drag import DragGrid, build_drag
-from atlas.drag_folds import solve_drag_folds
-from atlas.drag_table import open_drag
-from kernels import status
+import towatlas
+from towatlas.builders import drag_folds as build_drag_module
+from towatlas.builders.critical import build_atlas
+from towatlas.builders.drag_folds import DragGrid, build_drag
+from towatlas.kernels import status
+from towatlas.solve.drag_folds import solve_drag_folds
+from towatlas.tables.drag_folds import open_drag
 
 TINY = DragGrid(
     n_max=1,
@@ -52,15 +52,15 @@ def test_two_equilibria_more_and_two_fewer(lam, w_f, C, n):
     """The search in the radius of the fish, which knows nothing of folds, finds what they say."""
     folds = solve_drag_folds(lam, w_f, C, n)
     appears, ends = float(folds.appears), float(folds.ends)
-    count = [len(atlas.equilibria(lam, w_f, g, C=C)) for g in (appears * 0.9999, appears * 1.0001)]
+    count = [len(towatlas.equilibria(lam, w_f, g, C=C)) for g in (appears * 0.9999, appears * 1.0001)]
     assert count[1] == count[0] + 2
-    count = [len(atlas.equilibria(lam, w_f, g, C=C)) for g in (ends * 0.9999, ends * 1.0001)]
+    count = [len(towatlas.equilibria(lam, w_f, g, C=C)) for g in (ends * 0.9999, ends * 1.0001)]
     assert count[1] == count[0] - 2
 
 
 def test_from_the_vacuum_to_the_cusp():
     faint = solve_drag_folds(37.8, 1352, [0.0, 1e-9, 1e-5], 2)
-    vacuum = atlas.solve_critical(37.8, 1352, 2)
+    vacuum = towatlas.solve_critical(37.8, 1352, 2)
     assert faint.appears[0] == float(vacuum.gamma)
     np.testing.assert_allclose(faint.appears, float(vacuum.gamma), rtol=1e-8)
     assert (faint.status_ends == status.NEVER_ENDS).all()
@@ -159,7 +159,7 @@ def test_the_same_bytes_for_any_number_of_threads(drag_file, tmp_path):
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     (tmp_path / "bad.nc").write_bytes(data)
-    with pytest.raises(atlas.AtlasFileError, match="damaged"):
+    with pytest.raises(towatlas.AtlasFileError, match="damaged"):
         open_drag(tmp_path / "bad.nc")
 
 
@@ -173,13 +173,13 @@ def test_a_grid_over_the_end_of_a_cusp_is_refused(tmp_path):
 def test_an_atlas_without_drag_says_how_to_get_it(capsys, tmp_path, drag_file):
     atlas_path = tmp_path / "vacuum.nc"
     build_atlas(atlas_path, grid=SMALL_GRID, scan=SMALL_SCAN, progress=False)
-    with pytest.raises(atlas.AtlasFileError, match="no folds with drag; `towatlas build --drag`"):
+    with pytest.raises(towatlas.AtlasFileError, match="no folds with drag; `towatlas build --drag`"):
         open_drag(atlas_path)
     code, _, err = run(capsys, "critical", "--lam", "13", "--wf", "0.5", "--C", "0.01", "--atlas", atlas_path)
     assert code == 5
     assert "towatlas build --drag" in err
     # With drag it is an atlas like any other.
-    vacuum, gamma = atlas.open_atlas(drag_file[0]), float(atlas.solve_critical(8, 0.5).gamma)
+    vacuum, gamma = towatlas.open_atlas(drag_file[0]), float(towatlas.solve_critical(8, 0.5).gamma)
     assert vacuum.critical_speed(8, 0.5) == pytest.approx(gamma, rel=float(vacuum.error(8, 0.5)))
 
 
@@ -188,7 +188,7 @@ def test_plain_reader(drag_file):
 
     with xarray.open_dataset(drag_file[0], group="support/drag") as group:
         at = group.sel(drag_n=1, drag_w_f=0, drag_lam=12)
-        assert float(at.appears.sel(drag_C=0)) == pytest.approx(float(atlas.solve_critical(12, 0).gamma), rel=1e-4)
+        assert float(at.appears.sel(drag_C=0)) == pytest.approx(float(towatlas.solve_critical(12, 0).gamma), rel=1e-4)
         assert np.isnan(at.appears.sel(drag_C=0.1))
         assert float(at.C_cusp) == pytest.approx(float(solve_drag_folds(12, 0, 0.01).C_cusp), rel=1e-2)
 

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from test_cli import run
 
-import atlas
-from atlas.branches import shoot_lanes, shoot_singly, solve_members
-from atlas.limits import excess_length
-from kernels import status
+import towatlas
+from towatlas.kernels import status
+from towatlas.limits import excess_length
+from towatlas.solve.members import shoot_lanes, shoot_singly, solve_members
 
 
 def random_systems(rows, seed):
@@ -26,7 +26,7 @@ def expected_number(w_f, lam, gamma):
     number = np.ones(len(lam), int)
     n = 1
     while (exists := excess_length(lam, w_f, n) > 0).any():
-        states = atlas.solve_critical(lam[exists], w_f[exists], n)
+        states = towatlas.solve_critical(lam[exists], w_f[exists], n)
         number[exists] += 2 * (gamma[exists] > states.gamma)
         n += 1
     return number
@@ -35,7 +35,7 @@ def expected_number(w_f, lam, gamma):
 def test_count_identity():
     """Found by counting zeros of q, their number is the one that the critical speeds say: 600 random cables."""
     w_f, lam, gamma = random_systems(600, 11)
-    found = [atlas.equilibria(*system) for system in zip(lam, w_f, gamma, strict=True)]
+    found = [towatlas.equilibria(*system) for system in zip(lam, w_f, gamma, strict=True)]
     expected = expected_number(w_f, lam, gamma)
     np.testing.assert_array_equal([len(e) for e in found], expected)
     assert expected.max() > 15
@@ -66,14 +66,14 @@ def test_count_identity():
     ],
 )
 def test_roots_of_the_report(lam, w_f, gamma, root, nodes):
-    e = atlas.equilibria(lam, w_f, gamma)
+    e = towatlas.equilibria(lam, w_f, gamma)
     assert float(e.R_x0[e.median][0]) == pytest.approx(root, abs=6e-8)
     assert e.nodes[e.median][0] == nodes
 
 
 def test_crowded_roots():
     """Three of five roots in 0.3 % of the bounds of Eq. (35)."""
-    e = atlas.equilibria(37.8, 1352, 5.94)
+    e = towatlas.equilibria(37.8, 1352, 5.94)
     assert len(e) == 5
     assert list(e.nodes) == [1, 2, 2, 1, 0]
     bounds = 2 * 5.94**2 * (37.8**2 / 2 + 1352 * 37.8)
@@ -82,9 +82,9 @@ def test_crowded_roots():
 
 @pytest.mark.parametrize(("lam", "w_f", "n"), [(10.0, 0.0, 1), (10.0, 1.0, 2), (37.8, 1352.0, 2), (6.0, 50.0, 1)])
 def test_within_1e9_of_a_fold(lam, w_f, n):
-    fold = atlas.solve_critical(lam, w_f, n)
-    below = atlas.equilibria(lam, w_f, float(fold.gamma) * (1 - 1e-9))
-    above = atlas.equilibria(lam, w_f, float(fold.gamma) * (1 + 1e-9))
+    fold = towatlas.solve_critical(lam, w_f, n)
+    below = towatlas.equilibria(lam, w_f, float(fold.gamma) * (1 - 1e-9))
+    above = towatlas.equilibria(lam, w_f, float(fold.gamma) * (1 + 1e-9))
     assert (len(below), len(above)) == (2 * n - 1, 2 * n + 1)
     pair = above.R_x0[n - 1 : n + 1]
     assert pair == pytest.approx(float(fold.R_x0), rel=0.01)
@@ -95,7 +95,7 @@ def test_within_1e9_of_a_fold(lam, w_f, n):
 def test_both_members_appear_at_the_fold(distance):
     """On both sides of 600 folds, of slow cables and of those whose p(t_e; a) has peaks as sharp as a saw's teeth."""
     n, w_f, lam = random_cables(600, 5, n_max=12)
-    fold = atlas.solve_critical(lam, w_f, n)
+    fold = towatlas.solve_critical(lam, w_f, n)
     # Only folds known well enough to be told from the speed asked for.
     sure = (fold.status == status.OK) & (fold.gamma < 1e3) & (fold.error < distance / 10)
     n, w_f, lam, gamma = n[sure], w_f[sure], lam[sure], fold.gamma[sure]
@@ -141,7 +141,7 @@ def test_a_bad_guess_costs_time_only(shoot):
 
 def test_forward_shots_agree():
     """E of Skop's forward shot falls with the fourth power of the step at every root, to rounding."""
-    e = atlas.equilibria(12.0, 5.0, 1.8)
+    e = towatlas.equilibria(12.0, 5.0, 1.8)
     coarse, fine = (np.abs(boundary_error(5.0, 12.0, 1.8, e.R_x0, k)) for k in (400, 1600))
     assert (fine < coarse / 100 + 1e-11).all()
     assert coarse.max() > 1e-9
@@ -155,7 +155,7 @@ def test_root_against_34_digits(system):
     import reference
 
     lam, w_f, gamma = system
-    e = atlas.equilibria(*system)
+    e = towatlas.equilibria(*system)
     with mp.workdps(34):
         gamma2 = mp.mpf(gamma) ** 2
         for x_f, r_x0, error in zip(e.x_f, e.R_x0, e.error, strict=True):
@@ -174,7 +174,7 @@ def test_root_against_34_digits(system):
 
 @given(lam=st.floats(1e-3, 60), w_f=st.one_of(st.just(0.0), st.floats(1e-6, 1e4)), gamma=st.floats(0.01, 8))
 def test_any_system(lam, w_f, gamma):
-    e = atlas.equilibria(lam, w_f, gamma)
+    e = towatlas.equilibria(lam, w_f, gamma)
     assert len(e) % 2 == 1
     assert len(e) == expected_number(np.array([w_f]), np.array([lam]), np.array([gamma]))[0]
 
@@ -193,23 +193,23 @@ def test_any_system(lam, w_f, gamma):
 )
 def test_bad_input(system, match):
     with pytest.raises(ValueError, match=match):
-        atlas.equilibria(*system)
+        towatlas.equilibria(*system)
 
 
 def test_overflow_is_said():
     with pytest.raises(ArithmeticError, match="overflows"):
-        atlas.equilibria(1.0, 1e300, 1e10)
+        towatlas.equilibria(1.0, 1e300, 1e10)
 
 
 @pytest.mark.parametrize("system", [(1e80, 1.0, 1e60), (3.0, 0.0, 1e8), (1e5, 0.0, 1e3)])
 def test_what_would_take_minutes_is_refused(system):
     with pytest.raises(ArithmeticError, match="too many nodes"):
-        atlas.equilibria(*system)
+        towatlas.equilibria(*system)
 
 
 def test_fast_cable_with_few_equilibria():
     """11 000 extrema of p, two of them with equilibria: only what can exist is looked for."""
-    e = atlas.equilibria(3.0, 0.0, 1e4)
+    e = towatlas.equilibria(3.0, 0.0, 1e4)
     assert list(e.nodes) == [1, 1, 0]
 
 

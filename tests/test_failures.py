@@ -11,11 +11,11 @@ from helpers import boundary_error, shoot
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-import atlas
-from atlas.limits import excess_length, long_cable, massless_cable, threshold_length
-from atlas.published import rk4_root
+import towatlas
 from benchmarks import failures
-from kernels import status
+from towatlas.kernels import status
+from towatlas.limits import excess_length, long_cable, massless_cable, threshold_length
+from towatlas.report.published import rk4_root
 
 
 def exact_root(lam, w_f, gamma, x_f):
@@ -35,7 +35,7 @@ def exact_root(lam, w_f, gamma, x_f):
 @pytest.mark.parametrize(("lam", "w_f", "gamma"), [(10.0, 1.0, 10.0), (5.0, 1.0, 20.0)])
 def test_layers_thinner_than_a_step(lam, w_f, gamma):
     """Uniform steps in s: R_x crosses zero within less than one of a hundred. Nor do twice as many bring order four."""
-    e = atlas.equilibria(lam, w_f, gamma)
+    e = towatlas.equilibria(lam, w_f, gamma)
     # Two of them, the 34 digits take their time: the first of those with two nodes, and the one with most nodes.
     crossed = np.array([np.flatnonzero(e.nodes == 2)[0], e.nodes.argmax()])
     # The fish-up shots, steps even in d(sigma): 34 digits agree.
@@ -58,7 +58,7 @@ def test_layers_thinner_than_a_step(lam, w_f, gamma):
 def test_tip_of_a_bare_cable(system):
     """Off a root the tension vanishes at the tip faster than R_x, dx/ds jumps, and the fourth order is lost."""
     lam, w_f, gamma = system
-    e = atlas.equilibria(*system)
+    e = towatlas.equilibria(*system)
     k = len(e) // 2
     segments = np.array([100, 800])
     beside = e.R_x0[k] * (1 - 1e-4)
@@ -84,7 +84,7 @@ def test_tip_of_a_bare_cable(system):
 def test_pairs_closer_than_the_scan(lam, w_f, gamma, seen):
     one = np.array([lam]), np.array([gamma])
     scanned = failures.scanned_roots(w_f, *one)[0]
-    e = atlas.equilibria(lam, w_f, gamma)
+    e = towatlas.equilibria(lam, w_f, gamma)
     assert len(scanned) < len(e)
     assert seen is None or len(scanned) == seen
     # Every one found by the count is a root of E of forward shots, of segments enough: a change of sign.
@@ -111,7 +111,7 @@ def newton(lam, w_f, gamma, a, sign, rounds):
 def test_newton_at_a_fold():
     """At the double root each round gains one bit, and half the digits are all there are; the fold has them all."""
     lam, w_f = 3.0, 1.0
-    fold = atlas.solve_critical(lam, w_f, 1)
+    fold = towatlas.solve_critical(lam, w_f, 1)
     gamma, a = float(fold.gamma), abs(float(fold.x_f)) * float(fold.gamma) ** 2
     miss = np.abs(newton(lam, w_f, gamma, 1.1 * a, -1.0, 20) / a - 1)
     assert miss[1:12] / miss[:11] == pytest.approx(0.5, abs=0.05)
@@ -127,12 +127,12 @@ def test_newton_at_a_fold():
 def test_bracketing_at_a_fold(distance):
     """A double root, or a pair about it, changes no sign on either side; the count tells none from two."""
     lam, w_f, n = 12.0, 5.0, 1
-    fold = atlas.solve_critical(lam, w_f, n)
+    fold = towatlas.solve_critical(lam, w_f, n)
     gamma = float(fold.gamma) * (1 + distance)
     around = float(fold.R_x0) * np.array([0.99, 1.01])
     left, right = boundary_error(w_f, lam, gamma, around, 2000)
     assert left * right > 0
-    numbers = [len(atlas.equilibria(lam, w_f, float(fold.gamma) * (1 + s * 1e-9))) for s in (-1, 1)]
+    numbers = [len(towatlas.equilibria(lam, w_f, float(fold.gamma) * (1 + s * 1e-9))) for s in (-1, 1)]
     assert numbers == [1, 3]
 
 
@@ -143,25 +143,25 @@ def test_interpolation_across_the_threshold(atlas_file):
     """gamma_cn is infinite at lambda_cn(w_f): a table in lambda and w_f answers where there is nothing, and wrongly."""
     w_f = 0.0
     lam = np.arange(1.6, 4.0, 0.1)
-    nodes = atlas.solve_critical(lam, w_f, 1).gamma
+    nodes = towatlas.solve_critical(lam, w_f, 1).gamma
     table = lam[np.isfinite(nodes)], nodes[np.isfinite(nodes)]
     # No transition at 1.9, but linear interpolation, held at its last node, has one.
     assert np.isfinite(np.interp(1.9, *table))
     assert np.isnan(atlas_file.critical_speed(1.9, w_f, 1, outside="nan"))
-    assert atlas.solve_critical(1.9, w_f, 1).status == status.NO_TRANSITION
+    assert towatlas.solve_critical(1.9, w_f, 1).status == status.NO_TRANSITION
     # Between the threshold and its first nodes it is off by tens of percents.
     between = np.array([2.02, 2.05, 2.15])
-    exact = atlas.solve_critical(between, w_f, 1).gamma
+    exact = towatlas.solve_critical(between, w_f, 1).gamma
     miss = np.abs(np.interp(between, *table) / exact - 1)
     assert (miss > [0.4, 0.2, 0.02]).all()
     assert np.abs(atlas_file.critical_speed(between, w_f, 1) / exact - 1).max() < 1e-10
     # Along w_f too: at lambda = 1.5 the transition begins at w_f = 0.75.
     weights = np.arange(0.0, 4.0, 0.5)
-    speeds = atlas.solve_critical(1.5, weights, 1).gamma
+    speeds = towatlas.solve_critical(1.5, weights, 1).gamma
     some = np.isfinite(speeds)
     assert np.isfinite(np.interp(0.7, weights[some], speeds[some]))
     assert np.isnan(atlas_file.critical_speed(1.5, 0.7, 1, outside="nan"))
-    exact = atlas.solve_critical(1.5, 0.8, 1).gamma
+    exact = towatlas.solve_critical(1.5, 0.8, 1).gamma
     assert abs(np.interp(0.8, weights[some], speeds[some]) / exact - 1) > 0.3
     assert abs(atlas_file.critical_speed(1.5, 0.8, 1) / exact - 1) < 1e-10
 
@@ -203,7 +203,7 @@ def test_no_fish_and_almost_none():
     mu = np.array([1e-300, 1e-12, 1e-9, 1e-6])
     for light, ours in zip(mu, shoot(a, mu, t_end).p, strict=True):
         assert abs(ours - reference.shot(a, light, t_end).p) < 1e-13 * exact.amplitude
-    speeds = atlas.solve_critical(10.0, [0.0, 5e-324, 1e-300, 1e-16], 3).gamma
+    speeds = towatlas.solve_critical(10.0, [0.0, 5e-324, 1e-300, 1e-16], 3).gamma
     assert (np.abs(speeds / speeds[0] - 1) < 1e-14).all()
 
 
@@ -213,7 +213,7 @@ def test_no_fish_and_almost_none():
 def test_cancellation_under_a_heavy_fish():
     """t - mu and sqrt(1 + w_f^2) - w_f as they are written lose what is left of the cable."""
     lam, w_f = 10.0, 1e12
-    fold = atlas.solve_critical(lam, w_f, 1)
+    fold = towatlas.solve_critical(lam, w_f, 1)
     gamma2 = float(fold.gamma) ** 2
     mu, tau = gamma2 * w_f, gamma2 * lam
     assert abs(((mu + tau) - mu) / tau - 1) > 1e-6
@@ -240,7 +240,7 @@ def test_map_of_failures(tmp_path):
         assert (c.found, c.false_roots) == (c.equilibria, 0)
         assert c.largest_error < 1e-6
         assert c.median_root_error < 1e-6
-    assert [c.equilibria for c in cells] == [len(atlas.equilibria(c.lam, 1.0, c.gamma)) for c in cells]
+    assert [c.equilibria for c in cells] == [len(towatlas.equilibria(c.lam, 1.0, c.gamma)) for c in cells]
     assert fast.largest_error > 1e-4
     assert long_fast.found < long_fast.equilibria / 5
     assert long_fast.false_roots > 0
@@ -289,7 +289,7 @@ LARGE_OR_SMALL = st.floats(-10, 10).map(lambda e: 10.0**e)
 def test_critical_state_of_any_size(lam, w_f, n):
     if not lam > 0:
         return
-    state = atlas.solve_critical(lam, w_f, n)
+    state = towatlas.solve_critical(lam, w_f, n)
     assert int(state.status) in status.SENTENCES
     if state.status == status.OK:
         assert state.gamma > 0
@@ -314,7 +314,7 @@ def test_equilibria_of_any_size(lam, w_f, gamma):
     if 3e4 < half_waves * (1 + min(lam, half_waves)) < 1e8:
         return
     try:
-        e = atlas.equilibria(lam, w_f, gamma)
+        e = towatlas.equilibria(lam, w_f, gamma)
     except ArithmeticError as error:
         reason = str(error).split(": ", 1)[1]
     else:
@@ -338,7 +338,7 @@ def test_equilibria_of_any_size(lam, w_f, gamma):
 )
 def test_shot_of_any_size(a, mu, tau):
     """Two programs of the same series: both give the same end or neither gives any."""
-    from atlas.branches import shoot_singly
+    from towatlas.solve.members import shoot_singly
 
     ours = shoot(a, mu, tau, max_steps=20_000)
     assert ours.status[0] in (status.OK, status.STEP_LIMIT, status.BAD_INPUT)
@@ -368,20 +368,20 @@ def test_limit_in_n(n):
 )
 def test_limit_in_length_and_weight(lam, w_f, bound):
     """Long bare cables: p at the fold is a^2 of the wave's amplitude, and a falls as lambda^(-1/3)."""
-    fold = atlas.solve_critical(lam, w_f, 1)
+    fold = towatlas.solve_critical(lam, w_f, 1)
     a, gamma = abs(float(fold.x_f)) * float(fold.gamma) ** 2, float(fold.gamma)
     assert reference.fold_error(1, w_f, lam, a, gamma)[1] < bound
 
 
 @pytest.mark.parametrize(("lam", "w_f"), [(1e15, 0.0), (1e100, 0.0), (10.0, 1e60), (10.0, 1e200)])
 def test_beyond_the_limits_is_a_status(lam, w_f):
-    fold = atlas.solve_critical(lam, w_f, 1)
+    fold = towatlas.solve_critical(lam, w_f, 1)
     assert fold.status == status.NOT_CONVERGED
     assert np.isnan(fold.gamma)
 
 
 @pytest.mark.parametrize("gamma", [1e2, 1e5])
 def test_limit_in_gamma(gamma):
-    e = atlas.equilibria(2.5, 1.0, gamma)
+    e = towatlas.equilibria(2.5, 1.0, gamma)
     exact = [exact_root(2.5, 1.0, gamma, x_f) for x_f in e.x_f]
     assert np.abs(e.R_x0 / exact - 1).max() < 1e-14

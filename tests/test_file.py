@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import atlas
-from atlas.build import build_atlas
-from atlas.grids import Grid, ScanSettings
-from atlas.seal import AtlasFileError, read_sealed, write_seal
-from kernels import status
+import towatlas
+from towatlas.builders.critical import build_atlas
+from towatlas.builders.grids import Grid, ScanSettings
+from towatlas.kernels import status
+from towatlas.tables.seal import AtlasFileError, read_sealed, write_seal
 
 # Seconds rather than minutes: the same pipeline on few nodes.
 SMALL_GRID = Grid(
@@ -94,17 +94,17 @@ def test_attributes_are_ascii_and_complete(atlas_path):
 def test_same_bytes_again(atlas_path, tmp_path):
     """A second build, in another process with one thread everywhere, is the same file."""
     again = tmp_path / "again.nc"
-    command = [sys.executable, "-m", "atlas", "build", "--out", str(again), "--threads", "1", "--quiet"]
+    command = [sys.executable, "-m", "towatlas", "build", "--out", str(again), "--threads", "1", "--quiet"]
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
     subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)
     assert again.read_bytes() == atlas_path.read_bytes()
 
 
 def test_date_comes_from_the_environment_only(tmp_path, monkeypatch, small_path):
-    assert "date_created" not in atlas.open_atlas(small_path).attributes
+    assert "date_created" not in towatlas.open_atlas(small_path).attributes
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
     small(tmp_path / "dated.nc")
-    assert atlas.open_atlas(tmp_path / "dated.nc").attributes["date_created"] == "1970-01-02T00:00:00Z"
+    assert towatlas.open_atlas(tmp_path / "dated.nc").attributes["date_created"] == "1970-01-02T00:00:00Z"
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
     with pytest.raises(ValueError, match="SOURCE_DATE_EPOCH must be seconds"):
         small(tmp_path / "dated.nc")
@@ -142,11 +142,11 @@ def test_files_that_are_no_atlas(small_path, tmp_path):
     for content, match in cases.items():
         path.write_bytes(content)
         with pytest.raises(AtlasFileError, match=match):
-            atlas.open_atlas(path)
+            towatlas.open_atlas(path)
     with pytest.raises(AtlasFileError, match="cannot be read"):
-        atlas.open_atlas(tmp_path)
+        towatlas.open_atlas(tmp_path)
     with pytest.raises(FileNotFoundError, match="towatlas build"):
-        atlas.open_atlas(tmp_path / "absent.nc")
+        towatlas.open_atlas(tmp_path / "absent.nc")
 
 
 def test_newer_schema_is_refused(small_path, tmp_path):
@@ -159,7 +159,7 @@ def test_newer_schema_is_refused(small_path, tmp_path):
     path.write_bytes(data[:at] + b"0" * 64 + data[at + 64 :])
     write_seal(path)
     with pytest.raises(AtlasFileError, match="schema version 99, this towatlas reads up to 1; upgrade"):
-        atlas.open_atlas(path)
+        towatlas.open_atlas(path)
 
 
 def test_scan_build_holds_a_plain_table(tmp_path):
@@ -168,14 +168,14 @@ def test_scan_build_holds_a_plain_table(tmp_path):
     summary = build_atlas(path, "scan", scan=scan, progress=False)
     assert summary.folds > 5
     with xr.open_dataset(path) as table:
-        exact = atlas.solve_critical(table.lam.values, table.w_f.values[:, None], table.n.values[:, None, None])
+        exact = towatlas.solve_critical(table.lam.values, table.w_f.values[:, None], table.n.values[:, None, None])
         found = table.status.values == status.OK
         miss = np.abs(table.gamma_c.values / exact.gamma - 1)[found]
         assert (miss <= table.error.values[found]).all()
         assert table.attrs["scan_guesses"] == 256
         assert (table.status.values[exact.status == status.NO_TRANSITION] == status.NO_TRANSITION).all()
     with pytest.raises(AtlasFileError, match="lookup needs an atlas built with --method fold"):
-        atlas.open_atlas(path)
+        towatlas.open_atlas(path)
 
 
 def test_places_that_cannot_be_written(tmp_path):
@@ -196,7 +196,7 @@ def test_bad_build_arguments(tmp_path):
 SLOW_WRITE = """
 import sys, time
 from pathlib import Path
-from atlas.seal import written_in_place
+from towatlas.tables.seal import written_in_place
 with written_in_place(Path(sys.argv[1])) as temporary:
     temporary.write_bytes(b"half a file")
     print("writing", flush=True)
@@ -218,7 +218,7 @@ def test_kill_leaves_the_old_file_whole(small_path, tmp_path):
     # The next build sweeps up what the killed one left.
     small(path)
     assert list(tmp_path.iterdir()) == [path]
-    atlas.open_atlas(path)
+    towatlas.open_atlas(path)
 
 
 def test_kill_of_a_real_build(small_path, atlas_path, tmp_path):
@@ -228,7 +228,7 @@ def test_kill_of_a_real_build(small_path, atlas_path, tmp_path):
     before = path.read_bytes()
     whole = atlas_path.read_bytes()
     for delay in (0.5, 1.2, 2.0, 3.5):
-        command = [sys.executable, "-m", "atlas", "build", "--out", str(path), "--quiet"]
+        command = [sys.executable, "-m", "towatlas", "build", "--out", str(path), "--quiet"]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
         time.sleep(delay)
         process.kill()
@@ -236,7 +236,7 @@ def test_kill_of_a_real_build(small_path, atlas_path, tmp_path):
         # Not compared inside the assertion, whose report of a difference would take a minute.
         is_whole = path.read_bytes() in (before, whole)
         assert is_whole
-        atlas.open_atlas(path)
+        towatlas.open_atlas(path)
 
 
 def test_full_disk_leaves_the_old_file_whole(small_path, tmp_path):
@@ -248,7 +248,7 @@ def test_full_disk_leaves_the_old_file_whole(small_path, tmp_path):
         resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 
-    command = [sys.executable, "-m", "atlas", "build", "--out", str(path), "--quiet"]
+    command = [sys.executable, "-m", "towatlas", "build", "--out", str(path), "--quiet"]
     # With a cache already full of compiled kernels: numba may not write them either.
     done = subprocess.run(command, capture_output=True, text=True, preexec_fn=small_disk)
     assert done.returncode == 5, done.stderr
@@ -259,7 +259,7 @@ def test_full_disk_leaves_the_old_file_whole(small_path, tmp_path):
 
 def test_two_builds_at_once(tmp_path, atlas_path):
     path = tmp_path / "atlas.nc"
-    command = [sys.executable, "-m", "atlas", "build", "--out", str(path), "--quiet", "--threads", "1"]
+    command = [sys.executable, "-m", "towatlas", "build", "--out", str(path), "--quiet", "--threads", "1"]
     builds = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for _ in range(2)]
     assert [build.wait() for build in builds] == [0, 0]
     assert path.read_bytes() == atlas_path.read_bytes()

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scan_tools import root_near
 
-from kernels.scan import forward_shots
-from kernels.sweeps import forward_shots_parallel
+from towatlas.kernels.scan import forward_shots
+from towatlas.kernels.sweeps import forward_shots_parallel
 
 # NRL Report 7048, Eqs. after (36): the median roots of the system of Fig. 16, all digits as printed there, and the
 # roots of the equations themselves.
@@ -43,7 +43,7 @@ def test_fourth_order(w_f):
 
 def test_mirror():
     """(x, R_x) -> (-x, -R_x) is a symmetry: E is odd, shown by the difference of two shots about x = 1 to -1."""
-    from kernels.steppers import rk4_forward
+    from towatlas.kernels.steppers import rk4_forward
 
     right, left = (1.0, 3.0), (-1.0, -3.0)
     for k in range(50):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import chebyshev
 
-from atlas import interpolant
+from towatlas.numerics import chebyshev as interpolant
 
 AXES = interpolant.Axes(1e-3, 1e3, 1e4)
 

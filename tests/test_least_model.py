@@ -13,18 +13,18 @@ import reference_drag
 from test_cli import run
 from test_scene import changed
 
-import atlas
-from atlas.answers import answer_scene
-from atlas.branches import shoot_lanes
-from atlas.commands.common import announce_lanes
-from atlas.commands.scene import text_of
-from atlas.drag_shots import System
-from atlas.model_folds import ModelFolds, follow_folds, model_folds
-from atlas.models import QUESTIONS, check_questions, choose, compare, least_model, solvable_models, solve_model
-from atlas.placement import cables_to_depth, needs_lanes
-from atlas.report import PHOTOGRAPHS
-from atlas.scene_file import make_scene, read_scene
+import towatlas
 from benchmarks import models
+from towatlas.commands.common import announce_lanes
+from towatlas.commands.scene import text_of
+from towatlas.report.page import PHOTOGRAPHS
+from towatlas.scene.answers import answer_scene
+from towatlas.scene.file import make_scene, read_scene
+from towatlas.scene.model_folds import ModelFolds, follow_folds, model_folds
+from towatlas.scene.models import QUESTIONS, check_questions, choose, compare, least_model, solvable_models, solve_model
+from towatlas.solve.depths import cables_to_depth, needs_lanes
+from towatlas.solve.drag_shots import System
+from towatlas.solve.members import shoot_lanes
 
 HANGS = ("nodes", "position", "tension")
 PAGE = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text()
@@ -177,7 +177,7 @@ def test_folds_of_a_bare_cable_scale():
     """Loads over w: the cable of weight w at gamma is the one of weight 1 at gamma / sqrt(w), with the same C."""
     w = 0.6
     start, end = System(10.0, 0.0, 0.0, 0.02), System(10.0, 0.0, 0.0, 0.02, w=w)
-    folds = atlas.drag_folds.solve_drag_folds(10.0, 0.0, 0.02, n=[1, 2])
+    folds = towatlas.solve.drag_folds.solve_drag_folds(10.0, 0.0, 0.02, n=[1, 2])
     found = follow_folds(folds.r_f_appears, folds.appears, start, end)
     assert found == pytest.approx(folds.appears * np.sqrt(w), rel=1e-9)
 
@@ -189,7 +189,7 @@ def test_folds_in_a_dense_fluid():
     assert np.isfinite(folds.appears).any()
     for gamma in folds.appears[np.isfinite(folds.appears)]:
         below, above = (
-            len(atlas.equilibria(groups.lam, groups.w_f, gamma * part, groups.C, groups.m_f, groups.C_f, groups.w))
+            len(towatlas.equilibria(groups.lam, groups.w_f, gamma * part, groups.C, groups.m_f, groups.C_f, groups.w))
             for part in (0.998, 1.002)
         )
         assert above == below + 2
@@ -275,12 +275,12 @@ def test_the_kernel_of_many_lanes_is_announced_where_it_is_used(monkeypatch, gam
         return shoot_lanes(*arguments)
 
     # The function of the same name hides the module.
-    monkeypatch.setattr(sys.modules["atlas.equilibria"], "shoot_lanes", lanes)
-    monkeypatch.setattr("atlas.commands.common.announce_compilation", said.append)
+    monkeypatch.setattr(sys.modules["towatlas.solve.equilibria"], "shoot_lanes", lanes)
+    monkeypatch.setattr("towatlas.commands.common.announce_compilation", said.append)
     announce_lanes(*cable)
-    atlas.equilibria(*cable)
+    towatlas.equilibria(*cable)
     assert (said, bool(used)) == (["march"] if many else [], many)
     used.clear()
-    monkeypatch.setattr("atlas.placement.shoot_lanes", lanes)
+    monkeypatch.setattr("towatlas.solve.depths.shoot_lanes", lanes)
     cables_to_depth(0.0, gamma, 200.0, 300.0)
     assert bool(used) == needs_lanes(0.0, gamma, 300.0) == many

@@ -10,10 +10,11 @@ from helpers import random_cables
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import atlas
-from atlas import lookup
-from atlas.limits import threshold_length
-from kernels import extract, status
+import towatlas
+from towatlas.kernels import folds as extract
+from towatlas.kernels import status
+from towatlas.limits import threshold_length
+from towatlas.tables import critical as lookup
 
 QUANTITIES = ("gamma", "R_x0", "x_f", "z_f", "tension")
 METHODS = ("critical_speed", "reaction", "fish_offset", "fish_depth", "tow_tension", "error", "status")
@@ -22,7 +23,7 @@ FIXTURE = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 def test_lookup_is_the_direct_solution_everywhere(atlas_file):
     n, w_f, lam = random_cables(30000, 5)
-    found, exact = atlas_file.states(lam, w_f, n), atlas.solve_critical(lam, w_f, n)
+    found, exact = atlas_file.states(lam, w_f, n), towatlas.solve_critical(lam, w_f, n)
     for name in QUANTITIES:
         miss = np.abs(getattr(found, name) / getattr(exact, name) - 1)
         assert miss.max() < 1e-9, name
@@ -36,7 +37,7 @@ def test_edges_and_corners_of_the_domain(atlas_file):
         for w_f in (0.0, 1e-300, 1e-12, 1e4):
             lam = threshold_length(w_f, n) + np.array([1e-3, 1e3])
             found = atlas_file.states(lam, w_f, n)
-            exact = atlas.solve_critical(lam, w_f, n)
+            exact = towatlas.solve_critical(lam, w_f, n)
             assert set(found.status) == {status.OK}
             assert found.gamma == pytest.approx(exact.gamma, rel=1e-9)
 
@@ -104,7 +105,7 @@ def test_one_bad_point_spoils_no_other(atlas_file):
 
 def test_outside_solve_is_the_direct_solver(atlas_file):
     lam, w_f, n = np.array([2.0000001, 5000.0, 10.0, 50.0]), np.array([0.0, 3.0, 5e5, 0.0]), np.array([1, 2, 1, 9])
-    found, exact = atlas_file.states(lam, w_f, n, outside="solve"), atlas.solve_critical(lam, w_f, n)
+    found, exact = atlas_file.states(lam, w_f, n, outside="solve"), towatlas.solve_critical(lam, w_f, n)
     for name in (*QUANTITIES, "error", "status"):
         np.testing.assert_array_equal(getattr(found, name), getattr(exact, name))
 
@@ -135,7 +136,7 @@ def test_xarray_in_and_out(atlas_file):
 
 def test_labelled_arrays_are_aligned_or_refused(atlas_file):
     lam = xr.DataArray([5.0, 10.0], dims="cable")
-    for function in (atlas_file.states, atlas.solve_critical):
+    for function in (atlas_file.states, towatlas.solve_critical):
         with pytest.raises(ValueError, match=r"lam is a labelled DataArray; .* pass lam\.values"):
             function(lam, 1.0, 1)
     for labelled in (xr.Dataset({"lam": lam}), lam.variable):
@@ -153,10 +154,10 @@ def test_masked_values_are_not_looked_up(atlas_file):
 def test_threads_may_share_an_atlas(atlas_path):
     """Eight threads open the file and look up at once, in a process of their own: the NetCDF library would crash."""
     code = (
-        "import atlas\n"
+        "import towatlas\n"
         "from concurrent.futures import ThreadPoolExecutor\n"
-        f"ask = lambda lam: float(atlas.open_atlas({str(atlas_path)!r}).critical_speed(lam, 1.0))\n"
-        f"table = atlas.open_atlas({str(atlas_path)!r})\n"
+        f"ask = lambda lam: float(towatlas.open_atlas({str(atlas_path)!r}).critical_speed(lam, 1.0))\n"
+        f"table = towatlas.open_atlas({str(atlas_path)!r})\n"
         "with ThreadPoolExecutor(8) as pool:\n"
         "    a = list(pool.map(lambda lam: float(table.critical_speed(lam, 1.0)), range(5, 50)))\n"
         "    b = list(pool.map(ask, range(5, 50)))\n"
@@ -177,7 +178,7 @@ def test_atlas_can_be_pickled(atlas_file):
 def test_any_float_gets_a_value_or_a_reason(atlas_file, lam, w_f, n):
     states = atlas_file.states(lam, w_f, n, outside="nan")
     if states.status == status.OK:
-        exact = atlas.solve_critical(lam, w_f, n)
+        exact = towatlas.solve_critical(lam, w_f, n)
         assert states.gamma == pytest.approx(float(exact.gamma), rel=1e-9)
     else:
         assert np.isnan(states.gamma)
@@ -188,8 +189,8 @@ def test_any_float_gets_a_value_or_a_reason(atlas_file, lam, w_f, n):
 
 def test_lookup_imports_nothing_heavy(atlas_path):
     code = (
-        "import sys, atlas\n"
-        f"print(atlas.open_atlas({str(atlas_path)!r}).critical_speed([5.0, 10.0], 0.0, 1))\n"
+        "import sys, towatlas\n"
+        f"print(towatlas.open_atlas({str(atlas_path)!r}).critical_speed([5.0, 10.0], 0.0, 1))\n"
         "print([m for m in ('numba', 'xarray', 'matplotlib', 'scipy', 'pandas', 'tqdm') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -200,7 +201,7 @@ def test_nothing_within_rounding_of_the_threshold(atlas_file):
     """A few ulp beyond lambda_cn the excess length is all rounding: outside the atlas, however the ends are rounded."""
     rng = np.random.default_rng(8)
     n, w_f = rng.integers(1, 7, 300), 10.0 ** rng.uniform(-3, 3, 300)
-    lam = atlas.threshold_length(w_f, n)
+    lam = towatlas.threshold_length(w_f, n)
     for _ in range(12):
         lam = np.nextafter(lam, np.inf)
         states = atlas_file.states(lam, w_f, n, outside="nan")

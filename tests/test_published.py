@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from helpers import boundary_error
 
-import atlas.published
-from atlas.published import PUBLISHED, compare, euler_root, rk4_root
+import towatlas.report.published
+from towatlas.report.published import PUBLISHED, compare, euler_root, rk4_root
 
 ROWS = {row.published.quantity: row for row in compare()}
 
@@ -17,7 +17,7 @@ def row(beginning):
 
 
 def test_examples():
-    result = doctest.testmod(atlas.published)
+    result = doctest.testmod(towatlas.report.published)
     assert (result.attempted > 0, result.failed) == (True, 0)
 
 

@@ -12,11 +12,11 @@ from matplotlib.artist import Artist
 from matplotlib.lines import Line2D
 from test_cli import run
 
-import atlas
-import atlas.report_figures
-from atlas.published import PUBLISHED, compare
-from atlas.report import FIGURES, MODELS, PHOTOGRAPHS, report_page, vacuum_nodes
-from atlas.report_figures import DRAWN_SEGMENTS, FIG_16, WINDOWS, Cable, coarse_gap, root_names
+import towatlas
+import towatlas.report.figures
+from towatlas.report.figures import DRAWN_SEGMENTS, FIG_16, WINDOWS, Cable, coarse_gap, root_names
+from towatlas.report.page import FIGURES, MODELS, PHOTOGRAPHS, report_page, vacuum_nodes
+from towatlas.report.published import PUBLISHED, compare
 
 CURVES = [figure for figure in FIGURES if figure.cables]
 VOID = {"meta", "link", "br", "img", "hr", "input"}
@@ -155,7 +155,7 @@ def test_curves_cross_zero_at_the_roots_alone(figure):
         r_x0, errors = line.get_data()
         assert (r_x0[0], r_x0[-1]) == cable.bounds
         before = np.flatnonzero((errors[:-1] > 0) != (errors[1:] > 0))
-        roots = atlas.equilibria(cable.lam, cable.w_f, cable.gamma).R_x0
+        roots = towatlas.equilibria(cable.lam, cable.w_f, cable.gamma).R_x0
         assert len(before) == len(roots)
         assert (r_x0[before] < roots).all()
         assert (roots < r_x0[before + 1]).all()
@@ -173,7 +173,7 @@ def test_shapes_are_those_of_the_names():
     lines = FIGURES[-1].draw(None)
     plt.close("all")
     for cable, line in zip(FIG_16, lines, strict=True):
-        found = atlas.equilibria(cable.lam, cable.w_f, cable.gamma)
+        found = towatlas.equilibria(cable.lam, cable.w_f, cable.gamma)
         x, z = line.get_data()
         assert (x[0], z[0]) == (pytest.approx(1.0, abs=1e-9), 0.0)
         assert (x[-1], z[-1]) == (pytest.approx(found.x_f[found.median][0]), pytest.approx(found.z_f[found.median][0]))
@@ -187,7 +187,7 @@ def test_inner_roots_share_the_stated_part_of_the_range():
 
 
 def test_names_of_roots():
-    assert doctest.testmod(atlas.report_figures).failed == 0
+    assert doctest.testmod(towatlas.report.figures).failed == 0
     assert root_names(Cable(10.0, 0.0, 1.5).equilibria) == ["bl", "dl", "dr", "br", "a"]
     assert root_names(Cable(2.1, 0.0, 5.0).equilibria) == ["a"]
 
@@ -197,7 +197,7 @@ def test_photographs(page):
     wrong = [p for p in PHOTOGRAPHS if vacuum_nodes(p.lam, p.w_f, p.gamma) != p.nodes]
     assert [p.figure for p in wrong] == ["4c", "5a"]
     for p in wrong:
-        assert 1.0 < float(atlas.solve_critical(p.lam, p.w_f, p.nodes).gamma) / p.gamma < 1.02
+        assert 1.0 < float(towatlas.solve_critical(p.lam, p.w_f, p.nodes).gamma) / p.gamma < 1.02
     rows = [row for row in Page(page).rows if row[0] in {p.figure for p in PHOTOGRAPHS}]
     assert [int(row[4]) for row in rows] == [p.nodes for p in PHOTOGRAPHS]
     for k, (_, nodes) in enumerate(MODELS):

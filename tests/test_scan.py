@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-import atlas
-from atlas.limits import excess_length
-from kernels import status
-from kernels.scan import scan_system
+import towatlas
+from towatlas.kernels import status
+from towatlas.kernels.scan import scan_system
+from towatlas.limits import excess_length
 
 N_MAX = 4
 
@@ -18,7 +18,7 @@ def scan(w_f, lam, gamma_max=20.0, speeds=240, guesses=1024, segments=100, n_max
 
 
 def direct(w_f, lam, n_max=N_MAX):
-    return atlas.solve_critical(lam, w_f, np.arange(1, n_max + 1))
+    return towatlas.solve_critical(lam, w_f, np.arange(1, n_max + 1))
 
 
 CABLES = [

@@ -15,11 +15,13 @@ import numpy as np
 import pytest
 from test_cli import run
 
-import atlas
-from atlas import answers, placement, scene_file, units
-from atlas.scene import MODELS
-from atlas.scene_file import SceneFileError, make_scene, read_scene, shipped_scenes
-from atlas.units import parse_quantity
+import towatlas
+from towatlas.scene import answers, units
+from towatlas.scene import file as scene_file
+from towatlas.scene.file import SceneFileError, make_scene, read_scene, shipped_scenes
+from towatlas.scene.scene import MODELS
+from towatlas.scene.units import parse_quantity
+from towatlas.solve import depths as placement
 
 DOCS = Path(__file__).parent.parent / "docs" / "scenes.md"
 WET = {
@@ -274,12 +276,12 @@ def test_answers_for_a_scene(ask):
     assert answer["speed"]["rpm"] == pytest.approx(answer["speed"]["speed_m_s"] / 0.0174625 * 30 / math.pi, rel=1e-14)
     assert answer["transitions"] == 19
     jumps = answer["critical_speeds"]
-    exact = atlas.solve_critical(groups.lam, groups.w_f, range(1, 7))
+    exact = towatlas.solve_critical(groups.lam, groups.w_f, range(1, 7))
     assert [row["n"] for row in jumps] == [1, 2, 3, 4, 5, 6]
     assert [row["gamma"] for row in jumps] == pytest.approx(exact.gamma, rel=1e-9)
     assert {row["source"] for row in jumps} == {"atlas"}
     assert [row["n"] for row in jumps if row["near"]] == [2]
-    shapes = atlas.equilibria(groups.lam, groups.w_f, 3.3)
+    shapes = towatlas.equilibria(groups.lam, groups.w_f, 3.3)
     force = 0.0001824 / 0.3048 * 9.80665 * 0.0174625
     assert [row["nodes"] for row in answer["equilibria"]] == list(shapes.nodes)
     for name, values in (
@@ -364,7 +366,7 @@ def test_examples_of_the_page(atlas_path, tmp_path):
     commands = [[sys.executable, "-c", python]]
     lines = re.findall(r"^    towatlas (.*)$", text, re.M)
     assert len(lines) >= 4
-    commands += [[sys.executable, "-m", "atlas", *shlex.split(line, comments=True)] for line in lines]
+    commands += [[sys.executable, "-m", "towatlas", *shlex.split(line, comments=True)] for line in lines]
     for command in commands:
         done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
         assert done.returncode == 0, (command, done.stderr)

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from helpers import random_cables
 
-import atlas.seeds
-from atlas.critical import solve_rows
-from atlas.limits import excess_length
-from kernels import status
+import towatlas.solve.fold_seeds
+from towatlas.kernels import status
+from towatlas.limits import excess_length
+from towatlas.solve.critical import solve_rows
 
 
 def _curve(rows=400):
@@ -19,7 +19,7 @@ def _curve(rows=400):
 def test_seeds_are_near_and_their_slopes_true():
     """On a curve the guess is within 1e-5 of the solution, and the slopes are those of solutions nearby."""
     n, w_f, lam, excess = _curve()
-    a, gamma, slopes = atlas.seeds.seed(n, w_f, lam, excess, solve_rows)
+    a, gamma, slopes = towatlas.solve.fold_seeds.seed(n, w_f, lam, excess, solve_rows)
     solved = solve_rows(n, w_f, lam, excess)
     offset = np.abs(solved["x_f"]) * solved["gamma"] ** 2
     assert np.abs(np.log(gamma / solved["gamma"])).max() < 1e-5
@@ -42,7 +42,7 @@ def test_a_row_with_a_seed_is_a_row_without():
     table = solve_rows(n, w_f, lam, excess)
     few = slice(0, 3000, 75)
     alone = solve_rows(n[few], w_f[few], lam[few], excess[few])
-    assert len(alone["gamma"]) < atlas.seeds.FEWEST_ROWS
+    assert len(alone["gamma"]) < towatlas.solve.fold_seeds.FEWEST_ROWS
     both = table["status"][few] == alone["status"]
     assert both.all()
     close = np.abs(table["gamma"][few] / alone["gamma"] - 1) <= table["error"][few] + alone["error"]
@@ -58,7 +58,7 @@ def test_a_misleading_seed_does_no_harm(monkeypatch):
         rng = np.random.default_rng(3)
         return 10.0 ** rng.uniform(-2, 4, len(n)), 10.0 ** rng.uniform(-2, 3, len(n)), rng.normal(size=(len(n), 4))
 
-    monkeypatch.setattr("atlas.critical.seed", misled)
+    monkeypatch.setattr("towatlas.solve.critical.seed", misled)
     wrong = solve_rows(n, w_f, lam, excess)
     found = wrong["status"] == status.OK
     assert found.mean() > 0.9

@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_cli import run
 
-import atlas
-from atlas.plot import plot_shape
-from atlas.seal import read_sealed
-from kernels.steppers import rk4_forward
+import towatlas
+from towatlas.kernels.steppers import rk4_forward
+from towatlas.plot.critical import plot_shape
+from towatlas.tables.seal import read_sealed
 
 SYSTEMS = [
     (10.0, 1.0, 0.6, "median"),
@@ -30,7 +30,7 @@ SYSTEMS = [
 @pytest.mark.parametrize(("lam", "w_f", "gamma", "root"), SYSTEMS)
 def test_against_34_digits(lam, w_f, gamma, root):
     s = lam * np.array([0.0, 1e-9, 0.013, 0.31, 0.5, 0.77, 0.999])
-    curve = atlas.shape(lam, w_f, gamma, root=root, s=s)
+    curve = towatlas.shape(lam, w_f, gamma, root=root, s=s)
     with mp.workdps(34):
         gamma2 = mp.mpf(gamma) ** 2
         mu = gamma2 * mp.mpf(w_f)
@@ -53,7 +53,7 @@ def test_forward_shot_follows_the_shape():
     lam, w_f, gamma = 12.0, 5.0, 1.1
     misses = []
     for segments in (200, 800):
-        curve = atlas.shape(lam, w_f, gamma, s=np.linspace(0, lam, segments + 1))
+        curve = towatlas.shape(lam, w_f, gamma, s=np.linspace(0, lam, segments + 1))
         x, force, path = 1.0, float(curve.R_x[0]), [1.0]
         for k in range(segments):
             below = w_f + lam * (segments - k) / segments
@@ -73,7 +73,7 @@ def test_forward_shot_follows_the_shape():
 )
 def test_invariants(lam, w_f, gamma, outward):
     """Unit tangent, the tow point, the fish, force balance as integrals, and as many nodes as the count says."""
-    curve = atlas.shape(lam, w_f, gamma, root="outward" if outward else "median", s=np.linspace(0, lam, 4001))
+    curve = towatlas.shape(lam, w_f, gamma, root="outward" if outward else "median", s=np.linspace(0, lam, 4001))
     x, z, s = curve.x.values, curve.z.values, curve.s.values
     assert x[0] == pytest.approx(1.0, abs=1e-10 + 10 * curve.attrs["error"])
     assert z[0] == 0.0
@@ -90,22 +90,22 @@ def test_invariants(lam, w_f, gamma, outward):
     assert len(s_node) == curve.attrs["nodes"]
     assert (np.diff(s_node) > 0).all()
     if len(s_node):
-        at = atlas.shape(lam, w_f, gamma, root="outward" if outward else "median", s=s_node)
+        at = towatlas.shape(lam, w_f, gamma, root="outward" if outward else "median", s=s_node)
         assert (np.abs(at.x) < 1e-13 * (1 + lam)).all()
         np.testing.assert_allclose(at.z, curve.z_node, atol=1e-13 * (1 + lam))
 
 
 def test_any_order_and_every_root():
     lam, w_f, gamma = 37.8, 1352.0, 5.94
-    found = atlas.equilibria(lam, w_f, gamma)
+    found = towatlas.equilibria(lam, w_f, gamma)
     s = np.array([37.8, 0.0, 12.0])
     for k in range(len(found)):
-        curve = atlas.shape(lam, w_f, gamma, root=k, s=s)
+        curve = towatlas.shape(lam, w_f, gamma, root=k, s=s)
         assert curve.attrs["R_x0"] == found.R_x0[k]
         assert curve.x.values[0] == pytest.approx(found.x_f[k], rel=1e-14)
         assert curve.x.values[1] == pytest.approx(1.0, abs=1e-11)
         assert float(curve["T"][1]) == pytest.approx(found.tension[k], rel=1e-13)
-    assert atlas.shape(lam, w_f, gamma).sizes["s"] == 401
+    assert towatlas.shape(lam, w_f, gamma).sizes["s"] == 401
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_any_order_and_every_root():
 )
 def test_bad_input(more, match):
     with pytest.raises(ValueError, match=match):
-        atlas.shape(37.8, 1352, 5.94, **more)
+        towatlas.shape(37.8, 1352, 5.94, **more)
 
 
 def test_shell_files(capsys, tmp_path):
@@ -144,7 +144,7 @@ def test_shell_files(capsys, tmp_path):
     assert run(capsys, *system, "--out", tmp_path / "shape.nc")[0] == 0
     read_sealed(tmp_path / "shape.nc")
     with xr.open_dataset(tmp_path / "shape.nc") as file:
-        curve = atlas.shape(10, 1, 0.6)
+        curve = towatlas.shape(10, 1, 0.6)
         np.testing.assert_array_equal(file.x, curve.x)
         assert file.attrs["nodes"] == 1
         for name in ("x", "z", "R_x", "R_z", "T", "s", "s_node"):
@@ -163,7 +163,7 @@ def test_shell_usage(capsys, arguments):
 
 
 def test_figure_has_true_proportions():
-    curve = atlas.shape(37.8, 1352, 5.94)
+    curve = towatlas.shape(37.8, 1352, 5.94)
     figure, axes = plt.subplots()
     cable = plot_shape(curve, axes)
     assert axes.get_aspect() == 1.0

@@ -10,8 +10,8 @@ from helpers import boundary_error, shoot
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kernels import status
-from kernels.steppers import make_taylor_step
+from towatlas.kernels import status
+from towatlas.kernels.steppers import make_taylor_step
 
 EPS = 2.0**-52
 

@@ -13,17 +13,17 @@ import reference
 import xarray as xr
 from test_cli import run
 
-import atlas
-from atlas.build_equilibria import build_equilibria
-from atlas.equilibria import folds_passed, solve_branch
-from atlas.grids import EquilibriaGrid
-from atlas.seal import AtlasFileError, read_sealed
-from kernels import status
+import towatlas
+from towatlas.builders.fish import build_equilibria
+from towatlas.builders.grids import EquilibriaGrid
+from towatlas.kernels import status
+from towatlas.solve.equilibria import folds_passed, solve_branch
+from towatlas.tables.seal import AtlasFileError, read_sealed
 
 
 @pytest.fixture(scope="module")
 def table(equilibria_path):
-    return atlas.open_equilibria(equilibria_path)
+    return towatlas.open_equilibria(equilibria_path)
 
 
 def points(rows, seed):
@@ -61,7 +61,7 @@ def test_nodes_agree_with_the_critical_speeds(equilibria_path, equilibria_grid):
         assert np.nanmin(gamma_c) > 0
         passed = np.sum(gamma_c[..., None] < equilibria_grid.gamma, axis=0)
         np.testing.assert_array_equal(file.nodes.sel(branch=1), passed)
-        exact = atlas.solve_critical(equilibria_grid.lam, equilibria_grid.w_f[:, None], 1)
+        exact = towatlas.solve_critical(equilibria_grid.lam, equilibria_grid.w_f[:, None], 1)
         known = np.isfinite(gamma_c[0])
         np.testing.assert_allclose(gamma_c[0][known], exact.gamma[known], rtol=1e-11)
 
@@ -116,14 +116,14 @@ def test_lookup_is_as_good_as_it_says(table, branch):
 )
 def test_never_across_a_fold(table, lam, w_f, n):
     """However close to the critical speed, below it the shape before the jump, above it the one after."""
-    gamma_c = float(atlas.solve_critical(lam, w_f, n).gamma)
+    gamma_c = float(towatlas.solve_critical(lam, w_f, n).gamma)
     distance = np.concatenate([-np.logspace(-1.5, -10, 60), np.logspace(-10, -1.5, 60)])
     gamma = gamma_c * (1 + distance)
     found = table.fish(lam, w_f, gamma)
     np.testing.assert_array_equal(found.nodes, folds_passed(*np.broadcast_arrays(w_f, lam, gamma)))
     assert ((found.nodes == n) == (distance > 0)).all()
     assert (np.sign(found.x_f) == 1 - 2 * (found.nodes % 2)).all()
-    at = [atlas.equilibria(lam, w_f, g) for g in gamma[::10]]
+    at = [towatlas.equilibria(lam, w_f, g) for g in gamma[::10]]
     exact = np.array([e.x_f[e.median][0] for e in at])
     np.testing.assert_allclose(found.x_f[::10], exact, rtol=2e-3)
 
@@ -141,7 +141,7 @@ def test_edges_and_outside(table, equilibria_grid):
         assert table.fish(*point, outside="nan").status == status.OUTSIDE
         assert np.isnan(table.fish(*point, outside="nan").x_f)
         solved = table.fish(*point, outside="solve")
-        e = atlas.equilibria(*point)
+        e = towatlas.equilibria(*point)
         assert float(solved.x_f) == pytest.approx(e.x_f[e.median][0], rel=1e-11)
     bad = table.fish([2.0, np.nan, -1.0, 2.0], [-1.0, 1, 1, 1], [1, 1, 1, np.inf], outside="solve")
     assert (bad.status == status.BAD_INPUT).all()
@@ -165,15 +165,15 @@ def test_bad_input(table, more, match):
 
 def test_other_files_are_refused(equilibria_path, atlas_path, tmp_path):
     with pytest.raises(AtlasFileError, match="--equilibria"):
-        atlas.open_equilibria(atlas_path)
+        towatlas.open_equilibria(atlas_path)
     with pytest.raises(AtlasFileError, match="built with --method equilibria"):
-        atlas.open_atlas(equilibria_path)
+        towatlas.open_atlas(equilibria_path)
     torn = tmp_path / "torn.nc"
     torn.write_bytes(equilibria_path.read_bytes()[:-1])
     with pytest.raises(AtlasFileError, match="damaged"):
-        atlas.open_equilibria(torn)
+        towatlas.open_equilibria(torn)
     with pytest.raises(FileNotFoundError):
-        atlas.open_equilibria(tmp_path / "none.nc")
+        towatlas.open_equilibria(tmp_path / "none.nc")
 
 
 def test_shell(capsys, equilibria_path, monkeypatch, tmp_path):
@@ -183,7 +183,7 @@ def test_shell(capsys, equilibria_path, monkeypatch, tmp_path):
     assert (code, err) == (0, "")
     assert [row["branch"] for row in rows] == ["median", "outward"]
     assert rows[0]["nodes"] == 1
-    e = atlas.equilibria(8, 1, 0.9)
+    e = towatlas.equilibria(8, 1, 0.9)
     assert rows[0]["x_f"] == pytest.approx(e.x_f[e.median][0], rel=rows[0]["error"])
     code, out, _ = run(capsys, *system, "--gamma", 0.9, "--branch", "median")
     assert code == 0
@@ -203,7 +203,7 @@ def test_shell(capsys, equilibria_path, monkeypatch, tmp_path):
 
 
 def test_the_shell_builds_it(capsys, monkeypatch, tmp_path, equilibria_grid):
-    import atlas.build_equilibria as module
+    import towatlas.builders.fish as module
 
     small = {"w_f": equilibria_grid.w_f[:7], "lam": equilibria_grid.lam[:8], "gamma": equilibria_grid.gamma[:9]}
     monkeypatch.setattr(module, "EquilibriaGrid", lambda **axes: EquilibriaGrid(**small | axes))

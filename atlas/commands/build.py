@@ -4,9 +4,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from atlas.commands.common import OK, threads
-from atlas.lookup import default_path
-from atlas.table import DEFAULT_PATH
+from towatlas.commands.common import OK, threads
+from towatlas.tables.critical import default_path
+from towatlas.tables.fish import DEFAULT_PATH
 
 
 def add(commands: Any) -> None:
@@ -46,18 +46,18 @@ def _run(options: argparse.Namespace) -> int:
             raise ValueError("--drag and --equilibria make two files: build one after the other")
         if options.method:
             raise ValueError("--method says how critical speeds are found; a table of --equilibria has one method")
-        from atlas.build_equilibria import build_equilibria
+        from towatlas.builders.fish import build_equilibria
 
         print(build_equilibria(options.out or DEFAULT_PATH, **how))
         return OK
     if options.drag:
         if options.method == "scan":
             raise ValueError("--drag belongs in an atlas of method fold")
-        from atlas.build_drag import build_drag
+        from towatlas.builders.drag_folds import build_drag
 
         print(build_drag(options.out or default_path(), **how))
         return OK
-    from atlas.build import build_atlas
+    from towatlas.builders.critical import build_atlas
 
     method = options.method or "fold"
     print(build_atlas(options.out or (default_path() if method == "fold" else Path("build/scan.nc")), method, **how))

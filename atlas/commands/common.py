@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from atlas.lookup import default_path
+from towatlas.tables.critical import default_path
 
 OK, FAILED, USAGE, OUTSIDE, NO_STATE, FILE = 0, 1, 2, 3, 4, 5
 
@@ -100,7 +100,7 @@ def say(message: str) -> None:
 
 def announce_compilation(kernel: str, seconds: int = 20) -> None:
     """Say so before a kernel is compiled, which happens once after installation."""
-    from kernels.compiling import CACHE
+    from towatlas.kernels.compiling import CACHE
 
     if CACHE is None or not any(CACHE.rglob(f"*.{kernel}-*.nbi")):
         say(f"compiling, once after installation: this takes some {seconds} s")
@@ -108,7 +108,7 @@ def announce_compilation(kernel: str, seconds: int = 20) -> None:
 
 def announce_lanes(lam: float, w_f: float, gamma: float) -> None:
     """Say so before a cable with very many nodes has the kernel of many lanes compiled."""
-    from atlas.equilibria import needs_lanes
+    from towatlas.solve.equilibria import needs_lanes
 
     if needs_lanes(lam, w_f, gamma):
         announce_compilation("march")

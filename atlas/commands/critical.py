@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from atlas.commands.common import (
+from towatlas.commands.common import (
     FAILED,
     NO_STATE,
     OK,
@@ -20,13 +20,13 @@ from atlas.commands.common import (
     say,
     weight,
 )
-from atlas.critical import CriticalStates, solve_critical
-from atlas.drag_folds import solve_drag_folds
-from atlas.drag_table import open_drag
-from atlas.limits import transitions, unchecked_threshold_length
-from atlas.lookup import Atlas, open_atlas
-from atlas.nomenclature import REPORT, SYMBOLS
-from kernels import status
+from towatlas.kernels import status
+from towatlas.limits import transitions, unchecked_threshold_length
+from towatlas.nomenclature import REPORT, SYMBOLS
+from towatlas.solve.critical import CriticalStates, solve_critical
+from towatlas.solve.drag_folds import solve_drag_folds
+from towatlas.tables.critical import Atlas, open_atlas
+from towatlas.tables.drag_folds import open_drag
 
 # Transitions solved at once when none is named; a cable of 1e4 tow radii has 5000.
 MOST_SOLVED = 1000

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from atlas.answers import Design, design, longest_searched
-from atlas.commands.common import NO_STATE, OK, add_atlas, announce_compilation, say
-from atlas.commands.scene import add_speed, atlas_if_any, describe_speed, quantity, scene_of
-from atlas.equilibria import equilibria
-from atlas.models import Choice
-from atlas.placement import needs_lanes
-from atlas.scene import MODELS
+from towatlas.commands.common import NO_STATE, OK, add_atlas, announce_compilation, say
+from towatlas.commands.scene import add_speed, atlas_if_any, describe_speed, quantity, scene_of
+from towatlas.scene.answers import Design, design, longest_searched
+from towatlas.scene.models import Choice
+from towatlas.scene.scene import MODELS
+from towatlas.solve.depths import needs_lanes
+from towatlas.solve.equilibria import equilibria
 
 
 def add(commands: Any) -> None:

@@ -4,10 +4,10 @@ import argparse
 import json
 from typing import Any
 
-from atlas.commands.common import OK, announce_compilation, announce_lanes, drag, length, number, say, speed, weight
-from atlas.drag import DragEquilibria
-from atlas.equilibria import equilibria
-from atlas.nomenclature import SYMBOLS
+from towatlas.commands.common import OK, announce_compilation, announce_lanes, drag, length, number, say, speed, weight
+from towatlas.nomenclature import SYMBOLS
+from towatlas.solve.drag_equilibria import DragEquilibria
+from towatlas.solve.equilibria import equilibria
 
 
 def add(commands: Any) -> None:

@@ -5,10 +5,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from atlas.commands.common import FAILED, NO_STATE, OK, OUTSIDE, length, say, speed, weight
-from atlas.nomenclature import EQUILIBRIUM
-from atlas.table import BRANCHES, DEFAULT_PATH, open_equilibria
-from kernels import status
+from towatlas.commands.common import FAILED, NO_STATE, OK, OUTSIDE, length, say, speed, weight
+from towatlas.kernels import status
+from towatlas.nomenclature import EQUILIBRIUM
+from towatlas.tables.fish import BRANCHES, DEFAULT_PATH, open_equilibria
 
 
 def add(commands: Any) -> None:

@@ -4,9 +4,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from atlas.commands.common import OK
-from atlas.lookup import default_path, open_atlas, read_root
-from atlas.table import METHOD, open_equilibria
+from towatlas.commands.common import OK
+from towatlas.nomenclature import EQUILIBRIA
+from towatlas.tables.critical import default_path, open_atlas, read_root
+from towatlas.tables.fish import open_equilibria
 
 
 def add(commands: Any) -> None:
@@ -29,7 +30,7 @@ def _run(options: argparse.Namespace) -> int:
         print(f"{'n':<40}  1 .. {atlas.n_max}")
         print(f"{'w_f':<40}  0 .. {axes.w_f_max:g}")
         print(f"{'lam - lambda_c':<40}  {axes.excess_min:g} .. {axes.excess_max:g}")
-    elif attributes.get("method") == METHOD:
+    elif attributes.get("method") == EQUILIBRIA:
         for name, nodes in open_equilibria(options.file).grid.items():
             print(f"{name:<40}  {nodes[0]:g} .. {nodes[-1]:g}")
     for name in sorted(attributes):

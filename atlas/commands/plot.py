@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from atlas.commands.common import FIGURE_FORMATS, OK, add_atlas, announce_compilation, new_figure, save_figure
-from atlas.lookup import open_atlas
+from towatlas.commands.common import FIGURE_FORMATS, OK, add_atlas, announce_compilation, new_figure, save_figure
+from towatlas.tables.critical import open_atlas
 
 
 def add(commands: Any) -> None:
@@ -27,14 +27,14 @@ def _run(options: argparse.Namespace) -> int:
     if options.figure == "drag":
         announce_compilation("shoot_drag", 10)
         figure, axes = new_figure(7.2, 4.8)
-        from atlas.plot_drag import plot_drag_folds
+        from towatlas.plot.drag_folds import plot_drag_folds
 
         plot_drag_folds(ax=axes)
         save_figure(figure, options.out)
         return OK
     atlas = open_atlas(options.atlas)
     figure, axes = new_figure(7.2, 4.8)
-    from atlas.plot import plot_critical
+    from towatlas.plot.critical import plot_critical
 
     plot_critical(atlas, ax=axes)
     save_figure(figure, options.out)

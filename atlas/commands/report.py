@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from atlas.commands.common import OK, announce_compilation, say
+from towatlas.commands.common import OK, announce_compilation, say
 
 
 def add(commands: Any) -> None:
@@ -25,7 +25,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.out.suffix.lower() not in (".html", ".htm"):
         raise ValueError(f"--out {options.out}: the ending must be .html or .htm")
     announce_compilation("shoot_drag")
-    from atlas.report import write_report
+    from towatlas.report.page import write_report
 
     say(f"wrote {write_report(options.out)}")
     return OK

@@ -7,15 +7,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from atlas.answers import Jumps, SceneAnswer, answer_scene
-from atlas.commands.common import OK, add_atlas, announce_compilation, announce_lanes, say
-from atlas.commands.common import speed as dimensionless_speed
-from atlas.drag import DragEquilibria
-from atlas.lookup import Atlas, open_atlas
-from atlas.models import QUESTIONS, Choice, check_questions, percent
-from atlas.scene import KNOT, MODELS, Scene
-from atlas.scene_file import read_scene, shipped_scenes
-from kernels import status
+from towatlas.commands.common import OK, add_atlas, announce_compilation, announce_lanes, say
+from towatlas.commands.common import speed as dimensionless_speed
+from towatlas.kernels import status
+from towatlas.scene.answers import Jumps, SceneAnswer, answer_scene
+from towatlas.scene.file import read_scene, shipped_scenes
+from towatlas.scene.models import QUESTIONS, Choice, check_questions, percent
+from towatlas.scene.scene import KNOT, MODELS, Scene
+from towatlas.solve.drag_equilibria import DragEquilibria
+from towatlas.tables.critical import Atlas, open_atlas
 
 MEDIA = {"vacuum": "a vacuum", "air": "a nondense fluid", "water": "a dense fluid"}
 DRAG_COLUMNS = ("r_f_m", "x_f_m", "y_f_m", "z_f_m", "lag_deg", "tension_N")
@@ -56,7 +56,7 @@ def quantity(unit: str, bare: str | None = None) -> Any:
     """The type of an argument with a unit, positive; a bare number is SI, or in the unit named."""
 
     def positive(text: str) -> float:
-        from atlas.units import parse_quantity
+        from towatlas.scene.units import parse_quantity
 
         try:
             value: float | str = float(text)

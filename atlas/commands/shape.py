@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from atlas.commands.common import (
+from towatlas.commands.common import (
     FIGURE_FORMATS,
     OK,
     announce_compilation,
@@ -20,8 +20,8 @@ from atlas.commands.common import (
     speed,
     weight,
 )
-from atlas.nomenclature import EQUILIBRIUM
-from atlas.shape import POINTS, shape
+from towatlas.nomenclature import EQUILIBRIUM
+from towatlas.solve.shapes import POINTS, shape
 
 FORMATS = (".nc", ".csv", *FIGURE_FORMATS)
 COLUMNS = ("s", "x", "z", "R_x", "R_z", "T")
@@ -63,13 +63,13 @@ def _run(options: argparse.Namespace) -> int:
     curve = shape(options.lam, options.wf, options.gamma, root=root, s=arc)
     kind = options.out.suffix.lower() if options.out else ".csv"
     if kind == ".nc":
-        from atlas.dataset import write_atlas
+        from towatlas.builders.file import write_atlas
 
         write_atlas(options.out, curve, {})
     elif kind == ".csv":
         _write_csv(curve, options.out)
     else:
-        from atlas.plot import plot_shape
+        from towatlas.plot.critical import plot_shape
 
         figure, axes = new_figure(5.2, 6.4, "compressed")
         plot_shape(curve, axes)

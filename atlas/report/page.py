@@ -1,0 +1,321 @@
+"""NRL Report 7048 reproduced: its figures and its numbers, printed and recomputed, in one page that needs no other."""
+
+import html
+import io
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from string import Template
+from typing import Any, cast
+
+import matplotlib
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from towatlas.report.figures import (
+    DRAWN_SEGMENTS,
+    FIG_10,
+    FIG_12,
+    FIG_14,
+    FIG_16,
+    SIZES,
+    WINDOWS,
+    Cable,
+    coarse_gap,
+    plot_experiment_curves,
+    plot_experiment_shapes,
+    plot_one_node_curves,
+    plot_one_node_shapes,
+    plot_outward_shape,
+    plot_short_cables,
+    plot_threshold,
+    plot_two_node_curves,
+    plot_two_node_shapes,
+    root_names,
+)
+from towatlas.report.published import SEGMENTS, Comparison, compare
+from towatlas.report.text import CAPTIONS, PAGE
+from towatlas.solve.critical import solve_critical
+from towatlas.solve.drag_equilibria import DragEquilibria
+from towatlas.solve.equilibria import equilibria, vacuum_equilibria
+
+# Share of the height of a curve, about the width of a line, below which a reader sees no difference.
+VISIBLE = 0.005
+# Radius of the experiment [in].
+TOW_RADIUS = 11.0 / 16.0
+# Its drag constant, as the report gives it.
+DRAG = 0.018
+
+
+@dataclass(frozen=True)
+class ReportFigure:
+    """A figure of the report. cables : of the solution curves in it. folds : (lam, w_f, n) of the transitions in it."""
+
+    number: int
+    title: str
+    draw: Callable[[Axes | None], list[Artist]]
+    cables: tuple[Cable, ...] = ()
+    folds: tuple[tuple[float, float, int], ...] = ()
+
+
+FIGURES = (
+    ReportFigure(9, "Threshold length against the weight of the fish", plot_threshold),
+    ReportFigure(10, "Solution curves of cables no longer than the threshold", plot_short_cables, FIG_10),
+    ReportFigure(11, "Shape without a node", plot_outward_shape),
+    ReportFigure(12, "Solution curves at the first transition", plot_one_node_curves, FIG_12, ((2.1, 0.0, 1),)),
+    ReportFigure(13, "Shapes with one node", plot_one_node_shapes),
+    ReportFigure(
+        14, "Solution curves at two transitions", plot_two_node_curves, FIG_14, ((10.0, 0.0, 1), (10.0, 0.0, 2))
+    ),
+    ReportFigure(15, "Shapes with two nodes", plot_two_node_shapes),
+    ReportFigure(
+        16,
+        "Solution curves of a cable that was photographed",
+        plot_experiment_curves,
+        FIG_16,
+        ((37.8, 1352.0, 1), (37.8, 1352.0, 2), (37.8, 1352.0, 3)),
+    ),
+    ReportFigure(17, "Shapes of that cable", plot_experiment_shapes),
+)
+
+
+@dataclass(frozen=True)
+class Photograph:
+    """One of the photographs of Figs. 3-5 for which the report states the number of nodes; all in air."""
+
+    figure: str
+    lam: float
+    w_f: float
+    gamma: float
+    nodes: int
+
+
+PHOTOGRAPHS = (
+    Photograph("3a", 37.8, 1352.0, 1.64, 1),
+    Photograph("3b", 37.8, 1352.0, 2.97, 1),
+    Photograph("3c", 37.8, 1352.0, 5.94, 2),
+    Photograph("4a", 52.4, 1352.0, 2.46, 2),
+    Photograph("4c", 52.4, 1352.0, 4.77, 3),
+    Photograph("5a", 52.4, 1571.0, 2.60, 2),
+    Photograph("5b", 52.4, 1571.0, 4.77, 2),
+    Photograph("5c", 52.4, 1571.0, 7.23, 3),
+)
+
+
+def vacuum_nodes(lam: float, w_f: float, gamma: float) -> int:
+    """Nodes of the median equilibrium in a vacuum."""
+    found = vacuum_equilibria(lam, w_f, gamma)
+    return int(found.nodes[found.median][0])
+
+
+@cache
+def drag_nodes(lam: float, w_f: float, gamma: float) -> int:
+    """Nodes, with the drag of the experiment, of the equilibrium whose fish is nearest to the axis."""
+    found = cast(DragEquilibria, equilibria(lam, w_f, gamma, C=DRAG))
+    return int(found.nodes[found.near_axis][0])
+
+
+# A column of the table of photographs for each model: its title, and its number of nodes at (lam, w_f, gamma).
+MODELS: tuple[tuple[str, Callable[[float, float, float], int]], ...] = (
+    ("in a vacuum", vacuum_nodes),
+    ("with drag", drag_nodes),
+)
+
+
+def write_report(path: str | Path) -> Path:
+    """Write the page to a file; the same bytes every time on one machine.
+
+    Parameters
+    ----------
+    path : str or Path
+        Where to; its directory is made if need be.
+
+    Returns
+    -------
+    Path
+        The same.
+    """
+    path = Path(path)
+    page = report_page()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(page, encoding="utf-8")
+    return path
+
+
+def report_page() -> str:
+    """The page, as HTML with inline figures and nothing from elsewhere."""
+    rows = compare()
+    return Template(PAGE).substitute(
+        verdict=_verdict(rows),
+        contents="".join(f'<li><a href="#fig{f.number}">Fig. {f.number}</a> {f.title}</li>\n' for f in FIGURES),
+        numbers="".join(_number_row(row) for row in rows),
+        figures="".join(_figure(figure) for figure in FIGURES),
+        models="".join(f'<th scope="col" class="n">{title}</th>' for title, _ in MODELS),
+        photographs="".join(_photograph_row(photograph) for photograph in PHOTOGRAPHS),
+        failures=_failures(),
+        lengths=" and ".join(f"{lam * TOW_RADIUS:.1f} in" for lam in sorted({p.lam for p in PHOTOGRAPHS})),
+        drag=DRAG,
+        segments=SEGMENTS,
+        drawn_segments=f"{DRAWN_SEGMENTS:,}",
+    )
+
+
+def _verdict(rows: list[Comparison]) -> str:
+    """One sentence on what agrees, and a list of what does not."""
+    values = [row for row in rows if row.published.relation == "="]
+    bounds = [row for row in rows if row.published.relation in "<>"]
+    read_off = len(rows) - len(values) - len(bounds)
+    right = sum(row.agrees for row in values)
+    kept = sum(row.agrees for row in bounds)
+    differing = "".join(
+        f"<li>{_maths(row.published.quantity)}: printed {_number(row.text()[0])}, recomputed {_number(row.text()[1])}. "
+        f"{_maths(row.published.explanation)}</li>\n"
+        for row in values + bounds
+        if not row.agrees
+    )
+    return (
+        f"<p>Of {len(values)} values printed as such, {right} are right in every digit; of {len(bounds)} bounds, "
+        f"{kept} hold; {read_off} are given as approximate, most of them read off a figure. What differs:</p>\n"
+        f"<ul>\n{differing}</ul>"
+    )
+
+
+def _number_row(row: Comparison) -> str:
+    p = row.published
+    printed, recomputed, then = row.text()
+    verdict = ("agrees" if p.relation == "=" else "holds") if row.agrees else "differs"
+    if p.relation == "~":
+        verdict = "approximate"
+    then = f"{_number(then)}<br><small>{html.escape(p.method)}</small>" if then else ""
+    numbers = (_number(printed), _number(recomputed), _difference(row), then)
+    cells = "".join(f'<td class="n">{number}</td>' for number in numbers)
+    return (
+        f'<tr class="{verdict}"><td>{p.place.replace("Fig. ", "Fig.&nbsp;")}</td><td>{_maths(p.quantity)}</td>'
+        f"{cells}<td>{_maths(p.explanation)}</td></tr>\n"
+    )
+
+
+def _difference(row: Comparison) -> str:
+    """Recomputed less printed, with as many decimals as the recomputed value is shown with; of a bound nothing."""
+    if row.published.relation in "<>":
+        return ""
+    difference = row.recomputed - row.published.printed
+    decimals = len(row.text()[1].partition(".")[2])
+    return "0" if difference == 0.0 else _number(f"{difference:+.{decimals}f}")
+
+
+def _figure(figure: ReportFigure) -> str:
+    notes = [_gap_sentence(figure)] if figure.cables else []
+    if figure.folds:
+        speeds = ", ".join(
+            f"&gamma;<sub>c{n}</sub> = {float(solve_critical(lam, w_f, n).gamma):.6f}" for lam, w_f, n in figure.folds
+        )
+        lam, w_f, _ = figure.folds[0]
+        plural = "s" if len(figure.folds) > 1 else ""
+        notes.append(f"Critical speed{plural} at &lambda; = {lam:g}, <i>w</i><sub>f</sub> = {w_f:g}: {speeds}.")
+    return (
+        f'<section id="fig{figure.number}">\n<h3>Fig. {figure.number}. {figure.title}</h3>\n<figure>\n'
+        f"{_svg(figure)}\n<figcaption>{' '.join([CAPTIONS[figure.number], *notes])}</figcaption>\n</figure>\n"
+        f"{_root_table(figure.cables)}</section>\n"
+    )
+
+
+def _gap_sentence(figure: ReportFigure) -> str:
+    gap, cable, r_x0 = coarse_gap(figure.cables, WINDOWS[figure.number])
+    seen = "too little to see" if gap < VISIBLE else "enough to see"
+    where = f"curve {cable.name}" if cable.name else f"&gamma; = {cable.gamma:g}"
+    return (
+        f"With the report's {SEGMENTS} segments the curves lie within {_number(format(100.0 * gap, '.2g'))} % of the "
+        f"height from these, {seen}; farthest at {where}, <i>R</i><sub>x0</sub> = {_number(format(r_x0, '.4g'))}."
+    )
+
+
+def _root_table(cables: tuple[Cable, ...]) -> str:
+    if not cables:
+        return ""
+    rows = []
+    for cable in cables:
+        found = cable.equilibria
+        facts = f"&lambda; = {cable.lam:g}, <i>w</i><sub>f</sub> = {cable.w_f:g}, &gamma; = {cable.gamma:g}"
+        for k, name in enumerate(root_names(found)):
+            head = f'<th scope="rowgroup" rowspan="{len(found)}">{cable.name} {facts}</th>' if k == 0 else ""
+            columns = (found.R_x0, ".9g"), (found.x_f, ".6f"), (found.z_f, ".6f")
+            cells = "".join(f'<td class="n">{_number(format(column[k], form))}</td>' for column, form in columns)
+            median = ", median" if found.median[k] else ""
+            name = f"<i>R</i><sup>{name}</sup>{median}"
+            rows.append(f'<tr>{head}<td>{name}</td>{cells}<td class="n">{found.nodes[k]}</td></tr>\n')
+    return (
+        '<table class="narrow"><thead><tr><th scope="col">cable</th><th scope="col">root</th>'
+        '<th scope="col" class="n"><i>R</i><sub>x0</sub></th><th scope="col" class="n"><i>x</i><sub>f</sub></th>'
+        '<th scope="col" class="n"><i>z</i><sub>f</sub></th><th scope="col" class="n">nodes</th></tr></thead>\n'
+        f"<tbody>{''.join(rows)}</tbody></table>\n"
+    )
+
+
+def _photograph_row(p: Photograph) -> str:
+    cells = ""
+    for _, nodes in MODELS:
+        found = nodes(p.lam, p.w_f, p.gamma)
+        wrong = "" if found == p.nodes else " wrong"
+        cells += f'<td class="n{wrong}">{found}</td>'
+    facts = "".join(f'<td class="n">{fact}</td>' for fact in (f"{p.lam:g}", f"{p.w_f:g}", f"{p.gamma:.2f}", p.nodes))
+    return f"<tr><td>{p.figure}</td>{facts}{cells}</tr>\n"
+
+
+def _failures() -> str:
+    """What each model gets wrong, and by how much the speed misses the transition of the vacuum."""
+    sentences = []
+    for title, nodes in MODELS:
+        wrong = [p for p in PHOTOGRAPHS if nodes(p.lam, p.w_f, p.gamma) != p.nodes]
+        sentences.append(
+            f"{title.capitalize()} the number of nodes is right for {len(PHOTOGRAPHS) - len(wrong)} of the "
+            f"{len(PHOTOGRAPHS)} photographs{f', wrong for {len(wrong)}' if wrong else ''}."
+        )
+        for p in wrong:
+            found, speed = nodes(p.lam, p.w_f, p.gamma), float(solve_critical(p.lam, p.w_f, p.nodes).gamma)
+            above = 100.0 * (speed / p.gamma - 1.0)
+            sentences.append(
+                f"Fig. {p.figure} has {p.nodes} instead of {found}; in a vacuum {p.nodes} nodes are possible from "
+                f"&gamma;<sub>c{p.nodes}</sub> = {speed:.3f} on, {above:.1f} % above the speed of the photograph."
+            )
+    return " ".join(sentences)
+
+
+def _svg(figure: ReportFigure) -> str:
+    """The figure as an element of the page, with ids that no other figure has."""
+    style: Any = {"svg.hashsalt": "towatlas", "svg.fonttype": "path", "font.size": 10.0}
+    with matplotlib.rc_context(style):
+        drawing = Figure(figsize=SIZES[figure.number], layout="constrained")
+        figure.draw(drawing.subplots())
+        buffer = io.StringIO()
+        drawing.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    text = buffer.getvalue()
+    text = re.sub(r"<!--.*?-->\n?", "", text[text.index("<svg") :], flags=re.S).strip()
+    text = re.sub(r'(\bid="|href="#|url\(#)', rf"\1fig{figure.number}-", text)
+    label = html.escape(f"Fig. {figure.number}: {figure.title}")
+    return text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
+
+
+_SYMBOL = re.compile(r"\b(lambda|gamma)(?:_(c\d?))?\b|\b([Rwxz])_(x0|f)\b|\b(E)\b")
+
+
+def _maths(text: str) -> str:
+    """Plain text as HTML, its symbols set as such, equations not broken."""
+
+    def symbol(match: re.Match[str]) -> str:
+        greek, letter, error = match[1], match[3], match[5]
+        name = {"lambda": "&lambda;", "gamma": "&gamma;"}[greek] if greek else f"<i>{letter or error}</i>"
+        below = match[2] or match[4]
+        return name + (f"<sub>{below}</sub>" if below else "")
+
+    text = _SYMBOL.sub(symbol, re.sub(r"(?<![\w.])-(?=\d)", "&minus;", html.escape(text, quote=False)))
+    return text.replace(" = ", "&nbsp;=&nbsp;")
+
+
+def _number(text: str) -> str:
+    """A formatted number with a true minus, infinity as a sign and powers of ten as such."""
+    text = re.sub(r"e([+-])0*(\d+)", lambda m: f"&middot;10<sup>{m[1].strip('+')}{m[2]}</sup>", html.escape(text))
+    return text.replace("-", "&minus;").replace("inf", "&infin;")

@@ -1,0 +1,123 @@
+"""Words and frame of the page that reproduces NRL Report 7048."""
+
+CAPTIONS = {
+    9: "The length of cable up to which no shape has a node, Eq. (36): &lambda;<sub>c</sub> = 1 &minus; "
+    "<i>w</i><sub>f</sub> + &radic;(1 + <i>w</i><sub>f</sub><sup>2</sup>). The report reads it from the bounds "
+    "of Eq. (35) and confirms it by many solution curves; here it is also where the first critical speed goes "
+    "to infinity.",
+    10: "Boundary error at the fish for every guess of <i>R</i><sub>x0</sub> that Eq. (35) allows, at high speed. "
+    "Each curve crosses zero once, at a shape that swings outwards, and the report concludes that a cable this "
+    "short has no other shape at any speed.",
+    11: "The one shape of a cable without a fish, as long as the threshold, in true proportions: <i>x</i> grows "
+    "all the way from the tow point. The value of <i>R</i><sub>x0</sub> that the report prints with it is not "
+    "a root (see the numbers above).",
+    12: "As Fig. 10, for a cable longer than its threshold by 0.1. At the two lower speeds the hump at the left "
+    "end stays below zero; at &gamma; = 6.2 it has risen above, and two more roots exist (enlarged). The "
+    "report takes the speed at which the hump touches zero for the first critical speed.",
+    13: "The two shapes that have appeared at &gamma; = 6.2, in true proportions: both lie flat, cross the axis "
+    "once and end beyond it. The report takes them as proof that cables longer than the threshold do have "
+    "shapes with a node.",
+    14: "As Fig. 12, for a long cable. There are three roots at &gamma; = 0.5 (enlarged), just past the first "
+    "tangency, three at 1.0 and five at 1.5: each new pair appears beside the median root, on its left, and "
+    "its right member is the new median root. The report expects that one to be the shape that is seen.",
+    15: "The two shapes with two nodes at &gamma; = 1.5, in true proportions. That of <i>R</i><sup>dr</sup>, the "
+    "median root, hangs deeper and closer to the axis.",
+    16: "Solution curves of the cable photographed in Fig. 3, at the speeds of the photographs. The outermost "
+    "roots are a cable flung straight out; the photographed shapes belong to those in the middle, which at "
+    "&gamma; = 5.94 share 0.3 % of the range and are enlarged twice, since one of them all but coincides with "
+    "the root of &gamma; = 2.97.",
+    17: "Shapes of the median roots of Fig. 16, in true proportions: one node, one node, two nodes, the last of "
+    "them just above the fish. The report holds them against the photographs of Fig. 3, finds them alike, and "
+    "takes that as evidence for the median root.",
+}
+
+# $ marks what `towatlas.report.page` fills in.
+PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>NRL Report 7048, reproduced</title>
+<style>
+body { max-width: 54rem; margin: 2rem auto; padding: 0 1rem; background: #fff; color: #111;
+  font: 1rem/1.5 Georgia, "Times New Roman", serif; }
+h1, h2, h3, th, nav { font-family: "Helvetica Neue", Arial, sans-serif; line-height: 1.25; }
+h1 { font-size: 1.7rem; } h2 { font-size: 1.3rem; margin-top: 2.5rem; } h3 { font-size: 1.05rem; margin-top: 2.5rem; }
+a { color: #0050a0; }
+figure { margin: 0; break-inside: avoid; }
+figure svg { display: block; margin: 0 auto; max-width: 100%; height: auto; }
+figcaption { margin: .5rem 0 1rem; }
+table { border-collapse: collapse; width: 100%; font-size: .85rem; line-height: 1.35; }
+.wide { overflow-x: auto; }
+th, td { padding: .3rem .4rem; border-bottom: 1px solid #ccc; text-align: left; vertical-align: top; }
+thead th { border-bottom: 2px solid #111; }
+.numbers td:nth-child(2) { min-width: 9rem; }
+.numbers td:last-child { min-width: 10rem; }
+.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+tr { break-inside: avoid; }
+tr.differs td, td.wrong { background: #fdeee0; }
+td.wrong { font-weight: bold; }
+.narrow { width: auto; margin: 0 auto; }
+small { color: #333; white-space: normal; }
+sub, sup { line-height: 0; }
+@media print {
+  @page { margin: 16mm; }
+  body { max-width: none; margin: 0; padding: 0; font-size: 10pt; }
+  .wide { overflow: visible; }
+  h2, h3 { break-after: avoid; }
+  thead { display: table-header-group; }
+  table { font-size: 8pt; }
+  a { color: inherit; text-decoration: none; }
+}
+</style>
+</head>
+<body>
+<h1>NRL Report 7048, reproduced</h1>
+<p>R. A. Skop, <cite>On the Shape of a Cable Towed in a Circular Path</cite>, Naval Research Laboratory, 1970: each of
+its figures of the cable in a vacuum, drawn anew by towatlas, and each number that it prints beside the same number
+recomputed. Lengths are over the tow radius <i>R</i>, forces over (&mu; + &rho;<i>A</i>) <i>g</i> <i>R</i>; &lambda;
+is the length of the cable, <i>w</i><sub>f</sub> the weight of the fish, &gamma; = &Omega; &radic;(<i>R</i>/<i>g</i>)
+the speed and <i>R</i><sub>x0</sub> the radial force of the cable at the tow point.</p>
+$verdict
+<nav>
+<ul>
+<li><a href="#numbers">The numbers</a></li>
+$contents<li><a href="#photographs">The photographs</a></li>
+</ul>
+</nav>
+
+<h2 id="numbers">The numbers</h2>
+<p>A value agrees if every printed digit is right. A sign ~ marks a value that the report gives as approximate, &lt;
+and &gt; one that it gives as a bound. The difference is recomputed less printed. Where another method explains it, such
+as the report's own Runge-Kutta (RK4), the value that this gives stands beside. Rows that differ are shaded.</p>
+<div class="wide"><table class="numbers">
+<thead><tr><th scope="col">Place</th><th scope="col">Quantity</th><th scope="col" class="n">Printed</th>
+<th scope="col" class="n">Recomputed</th><th scope="col" class="n">Difference</th>
+<th scope="col" class="n">Explained by</th><th scope="col">Explanation</th></tr></thead>
+<tbody>
+$numbers</tbody></table></div>
+
+<h2 id="figures">The figures</h2>
+<p>Solution curves are forward shots, Eqs. (29) and (33), by the report's Runge-Kutta method with $drawn_segments
+segments in place of $segments. The report does not state the ranges of its axes; here each curve runs from the lower to
+the upper bound of Eq. (35), at the short bars. Circles are the equilibria, found from the fish up without the curves;
+their names are the report's: <i>a</i> for no node, <i>b</i> for one, <i>d</i> for two, <i>l</i> and <i>r</i> for the
+left and the right one of a pair. In shapes the triangle is the tow point, the disk the fish (or the end of a cable
+without one), a circle a node, and the line of dashes and dots the axis of rotation.</p>
+$figures
+<h2 id="photographs">The photographs</h2>
+<p>Figs. 3 to 5 of the report show cables in air, with the drag constant <i>C</i> = $drag. For eight photographs it
+states the number of nodes. Beside it stand that of the median root in a vacuum, and with the drag of the experiment
+that of the equilibrium whose fish is nearest to the axis.</p>
+<table class="narrow">
+<thead><tr><th scope="col">Fig.</th><th scope="col" class="n">&lambda;</th>
+<th scope="col" class="n"><i>w</i><sub>f</sub></th><th scope="col" class="n">&gamma;</th>
+<th scope="col" class="n">nodes photographed</th>$models</tr></thead>
+<tbody>
+$photographs</tbody></table>
+<p>$failures</p>
+<p>The weights of the fish and the drag constant are recomputed <a href="#numbers">above</a>. The lengths of the cables
+are not printed; with the tow radius of 11/16 in the values of &lambda; give $lengths.</p>
+</body>
+</html>
+"""

@@ -1,0 +1,1 @@
+"""Towing scenes in real units, and what is asked about them."""

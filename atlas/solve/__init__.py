@@ -1,0 +1,1 @@
+"""What is computed of a cable: critical speeds, equilibria, shapes, folds."""

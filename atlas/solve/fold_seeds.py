@@ -1,0 +1,116 @@
+"""Guesses for tables of critical states: solve a few cables from cold, interpolate the rest.
+
+The few are Chebyshev nodes of the box that the table fills in the coordinates of `towatlas.numerics.chebyshev`, one
+box for each n; they are solved the same way, from fewer still.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from towatlas.kernels import status
+from towatlas.limits import unchecked_threshold_length
+from towatlas.numerics import chebyshev as interpolant
+
+Array = NDArray[np.float64]
+
+# A node costs as much as three seeded rows, and saves a row two thirds of its time.
+ROWS_A_NODE = 8
+FEWEST_ROWS = 64
+# Nodes for each e-fold that a box spans, and for any box: measured, more gain nothing.
+NODES_AN_EFOLD = 2.0
+NODES_OF_ANY = 6
+# On an axis along which a table hardly extends: three nodes over this width give its slope.
+FEWEST_NODES, LEAST_WIDTH = 3, 0.1
+# Where rounding of lambda is a large part of the excess length, a series through such rows would be noise.
+MOST_ROUNDING = 1e8
+
+
+def seed(
+    n: NDArray[np.int64], w_f: Array, lam: Array, excess: Array, solve: Callable[..., dict[str, NDArray[Any]]]
+) -> tuple[Array, Array, Array]:
+    """Guesses of (a, gamma) and their slopes, as `towatlas.kernels.folds.solve_folds` takes them.
+
+    Parameters
+    ----------
+    n, w_f, lam, excess : ndarray, shape (rows,)
+        The cables.
+    solve : callable
+        `towatlas.solve.critical.solve_rows`, for the nodes.
+
+    Returns
+    -------
+    a, gamma : ndarray, shape (rows,)
+        Zero for rows without a guess.
+    slopes : ndarray, shape (rows, 4)
+        nan for rows without a guess.
+    """
+    rows = len(n)
+    a, gamma, slopes = np.zeros(rows), np.zeros(rows), np.full((rows, 4), np.nan)
+    if rows < FEWEST_ROWS:
+        return a, gamma, slopes
+    with np.errstate(invalid="ignore", divide="ignore"):
+        sound = np.isfinite(lam) & np.isfinite(w_f) & (w_f >= 0.0) & (n > 0)
+        sound &= (excess > 0.0) & (lam < MOST_ROUNDING * excess)
+    for order in np.unique(n[sound]):
+        group = np.flatnonzero(sound & (n == order))
+        if len(group) >= FEWEST_ROWS:
+            found = _seed_one(int(order), w_f[group], excess[group], solve)
+            if found is not None:
+                a[group], gamma[group], slopes[group] = found
+    return a, gamma, slopes
+
+
+def _seed_one(n: int, w_f: Array, excess: Array, solve: Callable) -> tuple[Array, Array, Array] | None:
+    """Guesses and slopes for rows of one n; None where no box of nodes pays or one of its nodes fails."""
+    from towatlas.kernels.fold_predictor import SLOPES, seed_folds
+
+    x, y = np.log(excess), np.log1p(w_f / interpolant.W_SCALE)
+    span = _box(x, y)
+    counts = _node_counts(span, len(w_f) / ROWS_A_NODE)
+    if counts is None:
+        return None
+    node_x, node_y = (
+        0.5 * (low + high) + 0.5 * (high - low) * interpolant.nodes(count)
+        for low, high, count in zip(span[::2], span[1::2], counts, strict=True)
+    )
+    node_w_f, node_excess = (
+        np.ascontiguousarray(grid.ravel())
+        for grid in np.meshgrid(interpolant.W_SCALE * np.expm1(node_y), np.exp(node_x), indexing="ij")
+    )
+    threshold = unchecked_threshold_length(node_w_f, n)
+    nodes = solve(np.full(len(node_w_f), n), node_w_f, threshold + node_excess, node_excess)
+    if (nodes["status"] != status.OK).any():
+        return None
+    log_gamma = np.log(nodes["gamma"])
+    fields = np.log(np.abs(nodes["x_f"])) + 2.0 * log_gamma + np.log(node_excess), log_gamma + 0.5 * np.log(node_excess)
+    series = interpolant.coefficients(np.stack([field.reshape(len(node_y), len(node_x)) for field in fields]))
+    a, gamma, slopes = np.empty(len(w_f)), np.empty(len(w_f)), np.empty((len(w_f), SLOPES))
+    seed_folds(series, excess, w_f, span, interpolant.W_SCALE, a, gamma, slopes, 0, len(w_f))
+    return a, gamma, slopes
+
+
+def _box(x: Array, y: Array) -> Array:
+    """Lowest and highest x, then y; widened where that is too little to tell a slope."""
+    span = np.array([x.min(), x.max(), y.min(), y.max()])
+    for axis in (0, 2):
+        short = LEAST_WIDTH - (span[axis + 1] - span[axis])
+        if short > 0.0:
+            # Upwards in y: there is no fish lighter than none.
+            span[axis] -= 0.5 * short if axis == 0 else 0.0
+            span[axis + 1] += 0.5 * short if axis == 0 else short
+    return span
+
+
+def _node_counts(span: Array, most: float) -> tuple[int, int] | None:
+    """Nodes in x and y for a box; None where `most` nodes are too few for it."""
+    wanted = NODES_OF_ANY + NODES_AN_EFOLD * (span[1::2] - span[::2])
+    wanted[span[1::2] - span[::2] <= 1.01 * LEAST_WIDTH] = FEWEST_NODES
+    wide = wanted > FEWEST_NODES
+    spare = most / np.prod(wanted)
+    if spare < 1.0:
+        wanted[wide] *= spare ** (1.0 / max(1, wide.sum()))
+    counts = wanted.astype(int)
+    return (counts[0], counts[1]) if counts.min() >= FEWEST_NODES else None

@@ -1,0 +1,49 @@
+"""Kinds of jets for the kernels of towatlas.kernels.series: which monomials, and which products give which."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Exponents of log r (radius of the fish), log gamma and log C.
+Monomial = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Jets:
+    """Monomials of a truncated polynomial algebra.
+
+    products : shape (products, 3), the factors and the result, sorted by the result, with the constant times the
+    result itself last of its kind. places : the monomials r, r^2, r^3, gamma and C, 0 where there is none.
+    """
+
+    monomials: tuple[Monomial, ...]
+    products: NDArray[np.int64]
+    places: NDArray[np.int64]
+    degree: int
+
+    def __len__(self) -> int:
+        return len(self.monomials)
+
+    def at(self, *monomial: int) -> int:
+        """Index of a monomial."""
+        return self.monomials.index(monomial)  # type: ignore[arg-type]
+
+
+def jets_of(degree: int, gamma: bool = False, drag: bool = False) -> Jets:
+    """Jets to a degree in log r, and to the first in log gamma and in log C (with r to one degree less)."""
+    monomials: list[Monomial] = [(k, 0, 0) for k in range(degree + 1)]
+    monomials += [(k, 1, 0) for k in range(degree) if gamma]
+    monomials += [(k, 0, 1) for k in range(degree) if drag]
+    # The kernels solve for one monomial after the other: those of lower degree come first.
+    monomials.sort(key=lambda m: (sum(m), m[::-1]))
+    at = {m: n for n, m in enumerate(monomials)}
+    products = []
+    for i, a in enumerate(monomials):
+        for j, b in enumerate(monomials):
+            total = tuple(x + y for x, y in zip(a, b, strict=True))
+            if total in at:
+                products.append((i, j, at[total]))  # type: ignore[index]
+    products.sort(key=lambda product: (product[2], -product[0]))
+    places = [at.get(m, 0) for m in ((1, 0, 0), (2, 0, 0), (3, 0, 0), (0, 1, 0), (0, 0, 1))]
+    return Jets(tuple(monomials), np.array(products, np.int64), np.array(places, np.int64), degree)

@@ -1,0 +1,248 @@
+"""The equilibria of cables, each found by its place in the count of zeros of q: nothing is scanned, nothing missed.
+
+On the shots of a cable (mu, tau) the number of zeros of q = dp/da falls, as the offset a grows, from its linear limit
+to zero. Each fall is an extremum of p(t_e; a), the n-th of them (from outside) with the sign (-1)^n; where it exceeds
+gamma^2 the n-th fold has been passed, and a pair of equilibria with n nodes lies about it: the inner member on the
+piece where the count is n, the outer one where it is n - 1. On each piece p is monotone, so whether a trial offset
+is above or below the wanted one is known from its count and its p alone.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from towatlas.kernels import status
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+# Offsets, starts and lengths of shots to their ends (tau, f, p, z, v, q), zeros of q passed, statuses.
+Shoot = Callable[[Array, Array, Array], tuple[Array, Integers, Integers]]
+
+# An offset in the linear limit, and one below every equilibrium: |p| outgrows a by no more than sqrt(mu).
+LINEAR = 1e-12
+# The fish is never farther out than a straight cable reaches, |x_f| <= 1 + lambda; fast cables come so close to it
+# that the bracket needs slack.
+BEYOND = 1.01
+ROUNDS = 200
+MAX_STEPS = 10**7
+EPS = 2.0**-52
+TINY = 1e-140
+# Steps in log a: one below this is made on the results instead of by another shot, the square of it being rounding.
+LAST_STEP = 1e-8
+# A step this much shorter than the way to the extremum is known to the square of it, and its root is no mirage.
+CLEAR = 1e-4
+# Curvature is taken from two shots no farther apart than this.
+CLOSE = 0.1
+# From here on a parallel call pays.
+PARALLEL_FROM = 512
+
+
+@dataclass(frozen=True)
+class Members:
+    """One equilibrium a row: offset a = gamma^2 |x_f|; R_x0, x_f, z_f over the tow radius; error estimate of x_f."""
+
+    a: Array
+    R_x0: Array
+    x_f: Array
+    z_f: Array
+    error: Array
+    status: Integers
+
+
+def shoot_lanes(a: Array, mu: Array, tau: Array) -> tuple[Array, Integers, Integers]:
+    """Many shots at once, on all threads."""
+    from towatlas.kernels.lanes import END_COLUMNS, FOLD_COLUMNS, march
+    from towatlas.kernels.sweeps import march_parallel
+
+    rows = len(a)
+    ends, counts, statuses = np.empty((rows, END_COLUMNS)), np.empty(rows, np.int64), np.empty(rows, np.int64)
+    folds, none = np.empty((rows, 1, FOLD_COLUMNS)), np.zeros(rows, np.int64)
+    if rows >= PARALLEL_FROM:
+        march_parallel(a, mu, tau, none, none, MAX_STEPS, ends, folds, counts, statuses)
+    else:
+        march(a, mu, tau, none, none, MAX_STEPS, ends, folds, counts, statuses, 0, rows)
+    return ends, counts, statuses
+
+
+def shoot_singly(a: Array, mu: Array, tau: Array) -> tuple[Array, Integers, Integers]:
+    """A few shots, with the kernel that is compiled soonest."""
+    from towatlas.kernels.vacuum_single import shoot_each
+
+    rows = len(a)
+    ends, counts, statuses = np.empty((rows, 6)), np.empty(rows, np.int64), np.empty(rows, np.int64)
+    shoot_each(a, mu, tau, MAX_STEPS, ends, counts, statuses)
+    return ends, counts, statuses
+
+
+def extrema(w_f: Array, lam: Array, gamma: Array, shoot: Shoot) -> tuple[Integers, Integers]:
+    """Number of extrema of p(t_e; a), which bounds that of the folds passed; and statuses."""
+    gamma2 = gamma * gamma
+    _, counts, statuses = shoot(LINEAR * np.minimum(1.0, gamma2), gamma2 * w_f, gamma2 * lam)
+    return counts, statuses
+
+
+def solve_members(
+    w_f: Array,
+    lam: Array,
+    gamma: Array,
+    n: Integers,
+    outer: NDArray[np.bool_],
+    shoot: Shoot,
+    guess: Array | None = None,
+) -> Members:
+    """The inner or outer member of the n-th pair of equilibria of each row's cable; n = 0 is the one without nodes.
+
+    Parameters
+    ----------
+    w_f, lam, gamma : ndarray, shape (rows,)
+    n : ndarray of int, shape (rows,)
+    outer : ndarray of bool, shape (rows,)
+        Which member; False for n = 0.
+    shoot : callable
+    guess : ndarray, shape (rows,), optional
+        Offsets a to start from, nan where there is none. A bad one costs time only.
+
+    Returns
+    -------
+    Members
+        status NOT_FOUND, and nan, where the n-th fold has not been passed.
+    """
+    rows = len(n)
+    gamma2 = gamma * gamma
+    mu, tau = gamma2 * w_f, gamma2 * lam
+    sign = np.where(n % 2 == 0, 1.0, -1.0)
+    side = np.where(outer, -1.0, 1.0)  # slope of sign p at the root
+    piece = n - outer
+    low, high = np.log(LINEAR * np.minimum(1.0, gamma2)), np.log(BEYOND * gamma2 * (1.0 + lam))
+    x = 0.5 * (low + high)
+    if guess is not None:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            start = np.log(guess)
+        x = np.where((start > low) & (start < high), start, x)
+    # Of the shots at the two ends of each bracket: zeros of q, slope, miss.
+    low_end, high_end = np.full((3, rows), np.nan), np.full((3, rows), np.nan)
+    x_old, slope_old, step_old = (np.full(rows, np.nan) for _ in range(3))
+    results = np.full((rows, 5), np.nan)
+    # Products this small have lost digits to underflow, or will have.
+    tiny = np.minimum(gamma2, tau) < TINY
+    codes = np.where(tiny, status.BAD_INPUT, status.NOT_CONVERGED)
+    i = np.flatnonzero(~tiny)
+    for round_ in range(ROUNDS):
+        if not len(i):
+            break
+        a = np.exp(x[i])
+        ends, counts, statuses = shoot(a, mu[i], tau[i])
+        p, q = ends[:, 2], ends[:, 5]
+        miss, slope = sign[i] * p / gamma2[i] - 1.0, sign[i] * a * q / gamma2[i]
+        here = counts == piece[i]
+        above = (counts < piece[i]) | (here & ((miss >= 0.0) != outer[i]))
+        for bound, end, moved in ((high, high_end, above), (low, low_end, ~above)):
+            bound[i[moved]] = x[i[moved]]
+            end[:, i[moved]] = np.stack([counts, slope, miss])[:, moved]
+        width = high[i] - low[i]
+        with np.errstate(all="ignore"):
+            peak, top = _tangents(n[i], low[i], low_end[:, i], high[i], high_end[:, i])
+            beside = (counts == n[i]) | (counts == n[i] - 1)
+            step, reach = _step(x[i], slope, miss, side[i], here, beside, x_old[i], slope_old[i])
+            narrow = width <= 4.0 * EPS * np.maximum(1.0, np.abs(x[i]))
+            failed = statuses != status.OK
+            small = here & (np.abs(step) <= LAST_STEP)
+            # Two ends on one piece hold the root. Then a step that no longer shrinks is rounding.
+            held = high_end[0, i] == low_end[0, i]
+            noise = held & (np.abs(step) >= 0.5 * np.abs(step_old[i]))
+            landed = small & ((np.abs(step) <= CLEAR * reach) | noise) & ~failed
+            held &= narrow & ~landed & ~failed
+            absent = ((top < 0.0) & (width * (1 + n[i]) < CLOSE) | narrow) & ~landed & ~held & ~failed
+            trial = np.where(np.isfinite(step), x[i] + step, peak)
+            astray = ~((trial > low[i]) & (trial < high[i])) | (round_ % 8 == 7)
+        x_old[i], slope_old[i], step_old[i] = x[i], slope, step
+        codes[i[failed]] = statuses[failed]
+        codes[i[absent]] = status.NOT_FOUND
+        found = landed | held
+        if found.any():
+            k = i[found]
+            shift = np.where(landed, step, 0.0)[found]
+            codes[k] = status.OK
+            results[k] = _finish(a[found], shift, ends[found], counts[found], mu[k], gamma2[k], sign[k], slope[found])
+        x[i] = np.where(astray, 0.5 * (low[i] + high[i]), trial)
+        i = i[~(found | absent | failed)]
+    # A fish deeper than the cable is long is arithmetic that gave out, too.
+    with np.errstate(invalid="ignore"):
+        sound = np.isfinite(results).all(axis=1) & (results[:, 3] <= 1.001 * lam)
+    overflowed = (codes == status.OK) & ~sound
+    codes[overflowed] = status.BAD_INPUT
+    results[overflowed] = np.nan
+    a, r_x0, x_f, z_f, error = results.T
+    return Members(a, r_x0, x_f, z_f, error, codes)
+
+
+def _tangents(n: Integers, low: Array, low_end: Array, high: Array, high_end: Array) -> tuple[Array, Array]:
+    """Where the tangents at two shots astride the n-th extremum meet, and a bound of its height.
+
+    The bound is the height of that point and a tenth of the way up to it, for the flanks of the peaks of fast cables
+    are a little convex.
+    """
+    astride = (low_end[0] == n) & (high_end[0] == n - 1)
+    fall = low_end[1] - high_end[1]
+    share = (high_end[2] - low_end[2] - high_end[1] * (high - low)) / fall
+    share = np.where(astride & (fall > 0.0), share, np.nan)
+    top = low_end[2] + low_end[1] * share
+    return low + share, top + 0.1 * (top - np.minimum(low_end[2], high_end[2]))
+
+
+def _step(
+    x: Array,
+    slope: Array,
+    miss: Array,
+    side: Array,
+    here: NDArray[np.bool_],
+    beside: NDArray[np.bool_],
+    x_old: Array,
+    slope_old: Array,
+) -> tuple[Array, Array]:
+    """Step in log a to the root with the wanted sign of the slope, and the way to the extremum; nan where not known.
+
+    From slope and curvature, which near a fold tell on which side of the extremum a shot lies and how far, where
+    Newton's method knows nothing. `here`: on the piece that holds the root; `beside`: on either side of the n-th
+    extremum.
+    """
+    apart = x - x_old
+    curvature = (slope - slope_old) / apart
+    discriminant = slope * slope - 2.0 * curvature * miss
+    root = side * np.sqrt(discriminant)
+    # Of the two forms of the quadratic's root the one without cancellation.
+    quadratic = np.where(slope * side >= 0.0, -2.0 * miss / (slope + root), (root - slope) / curvature)
+    trusted = beside & (np.abs(apart) < CLOSE) & np.isfinite(quadratic)
+    newton = np.where(here & (slope * side > 0.0), -miss / slope, np.nan)
+    return np.where(trusted, quadratic, newton), np.where(trusted, np.abs(slope / curvature), np.nan)
+
+
+def _finish(
+    a: Array,
+    shift: Array,
+    ends: Array,
+    counts: Integers,
+    mu: Array,
+    gamma2: Array,
+    sign: Array,
+    slope: Array,
+) -> Array:
+    """R_x0, x_f, z_f at a(1 + shift), to first order in the shift."""
+    tau, f, p, z, v, q = ends.T
+    t = mu + tau
+    # z = H(end) - H(start) with H = r + p^2 / 2.
+    terms = np.stack([f * v / np.hypot(t, f), p * q, -mu * a / np.hypot(1.0, a), -a])
+    # Under a heavy fish, and on a short fast cable, their sum is rounding. Little changes then along the cable, and
+    # the integral of dz/dt has hardly more than its ends.
+    noisy = EPS * a * np.abs(terms).sum(axis=0) > 0.1 * tau
+    ends_only = -0.5 * tau * (a / (1.0 + a * a) ** 1.5 + (f / t) * (v / t) / (1.0 + (f / t) ** 2) ** 1.5)
+    z_slope = np.where(noisy, ends_only, terms.sum(axis=0))
+    da = a * shift
+    scale = sign / gamma2
+    # What rounding of p, of the local amplitude of the wave, moves the root.
+    amplitude = np.hypot(p, f / np.sqrt(np.hypot(t, f)))
+    rounding = 4.0 * EPS * (1.0 + counts) * amplitude / gamma2 / np.abs(slope)
+    error = np.maximum(rounding, EPS) + shift * shift
+    return np.stack([a + da, scale * (f + v * da), scale * (a + da), (z + z_slope * da) / gamma2, error], axis=1)

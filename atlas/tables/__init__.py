@@ -1,0 +1,1 @@
+"""Reading the files: numpy and netCDF4 only."""
