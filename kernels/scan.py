@@ -185,6 +185,8 @@ def _window(w_f, lam, n, gamma, low, high, segments, errors, places):
     right = min(places[n + 1], places[n] + 2) + 1
     sign = n % 2 == 1
     low, high = low + left * spacing, low + right * spacing
+    # Of a pair too close to be seen with this many guesses, the window that must hold it.
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
     for _ in range(ZOOMS):
         # Between the pair (-1)^(n-1) E is positive; a run of that sign that touches an end belongs to a neighbour.
         solution_curve(w_f, lam, gamma, low, high, segments, errors)

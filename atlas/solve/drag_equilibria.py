@@ -279,6 +279,7 @@ def _continue(system: System, gamma: float, r: Array) -> Array:
             break
         row[[3, 4, 6]] = share * drags
         x = x + drift * np.log(share / previous)
+        step = np.full(len(x), np.inf)
         for _ in range(6):
             ends = shoot(np.exp(x), gamma, row, jets)
             raise_failures(ends.status, system, gamma)
