@@ -9,7 +9,7 @@ import sys
 
 from towatlas import __version__
 from towatlas.commands import build, critical, design, equilibria, fish, info, plot, report, scene, shape
-from towatlas.commands.common import FAILED, FILE, OK, USAGE, say
+from towatlas.commands.common import FAILED, FILE, OK, USAGE, announce_compilation, say
 from towatlas.tables.seal import AtlasFileError
 
 # In the order in which help lists them.
@@ -34,6 +34,7 @@ def _parser() -> argparse.ArgumentParser:
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     options = _parser().parse_args(arguments)
+    announce_compilation()
     try:
         return options.run(options)
     except AtlasFileError as error:

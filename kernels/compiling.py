@@ -1,24 +1,35 @@
-"""The decorators every kernel is compiled with, and the cache that can never serve older kernels.
+"""The decorators every kernel is compiled with, and a cache that serves neither old nor damaged kernels.
 
 numba keys its cache on the source of the *decorated* file alone: a kernel that calls another file's
 kernels would keep their old code after a change. Here the cache folder carries a hash of all kernel
 sources, so any change anywhere in this package starts an empty cache (test_cache_serves_no_old_kernel).
+Nor does numba look at what it reads: a file cut short is a traceback at every start, a flipped bit other machine code.
+Here each file begins with the SHA-256 of the rest, and one that does not fit is thrown away.
 """
 
 import hashlib
 import os
+import pickle
 import shutil
+import sys
+import threading
 import time
 from collections.abc import Callable
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import wraps
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 import numba
+from numba.core import event
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+from towatlas.kernels import notice
 
 SOURCE_FOLDER = Path(__file__).parent
 STALE_AFTER = 30 * 86400.0  # s; a cache of other sources unused for this long is deleted
+DIGEST_BYTES = hashlib.sha256().digest_size
 
 # numpy's error model: a division by zero is inf or nan, not an exception. An exception is a branch, and a loop
 # with branches does not vectorise. Only `contract` of fastmath: fused multiply-adds, and isnan still works.
@@ -60,9 +71,92 @@ def _usable_cache() -> Path | None:
 CACHE = _usable_cache()
 
 
+class _SealedFile(IndexDataCacheFile):
+    """numba's index and data files of one kernel, each behind a digest."""
+
+    def _load_index(self) -> dict:
+        content = self._read(self._index_path)
+        if content is None:
+            return {}
+        version, stamp, overloads = content
+        return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
+
+    def _save_index(self, overloads: dict) -> None:
+        self._write(self._index_path, (self._version, self._source_stamp, overloads))
+
+    def _load_data(self, name: str) -> Any:
+        return self._read(self._data_path(name))
+
+    def _save_data(self, name: str, data: Any) -> None:
+        self._write(self._data_path(name), data)
+
+    def _read(self, path: str) -> Any:
+        """What a file holds; None where there is none, or none that is whole."""
+        try:
+            content = Path(path).read_bytes()
+        except OSError:
+            return None
+        seal, payload = content[:DIGEST_BYTES], content[DIGEST_BYTES:]
+        if hashlib.sha256(payload).digest() != seal:
+            _throw_away(path)
+            return None
+        return pickle.loads(payload)
+
+    def _write(self, path: str, content: Any) -> None:
+        payload = self._dump(content)
+        with self._open_for_write(path) as file:
+            file.write(hashlib.sha256(payload).digest() + payload)
+
+
+class _SealedCache(FunctionCache):
+    """numba's cache of one kernel, on files that are checked."""
+
+    def __init__(self, function: Callable):
+        super().__init__(function)
+        plain = self._cache_file
+        self._cache_file = _SealedFile(
+            cache_path=self._cache_path,
+            filename_base=self._impl.filename_base,
+            source_stamp=plain._source_stamp,
+        )
+
+
+_said_damaged = False
+
+
+def _throw_away(path: str) -> None:
+    """Delete a damaged file; the first of a process is told of."""
+    global _said_damaged
+    with suppress(OSError):
+        os.unlink(path)
+    if not _said_damaged:
+        _said_damaged = True
+        print(f"towatlas: {path} is damaged: compiling what was in it again", file=sys.stderr)
+
+
+class _Listener(event.Listener):
+    """Tells `kernels.notice` of every kernel that is compiled; what it calls is compiled within."""
+
+    def __init__(self) -> None:
+        self.depth = 0
+
+    def on_start(self, event: event.Event) -> None:
+        function = event.data["dispatcher"].py_func
+        # numba compiles under a lock of its own: one thread at a time counts here.
+        self.depth += 1
+        if self.depth == 1 and function.__module__.startswith(__name__.rpartition(".")[0]):
+            notice.compiling(function.__name__)
+
+    def on_end(self, event: event.Event) -> None:
+        self.depth -= 1
+
+
+event.register("numba:compile", _Listener())
+
+
 @contextmanager
 def _own_cache_folder():
-    # The folder is a process-wide setting of numba, read while the decorator runs: put it back at once.
+    # The folder is a process-wide setting of numba, read while the cache is made: put it back at once.
     settings: Any = numba.config
     before = settings.CACHE_DIR
     settings.CACHE_DIR = str(CACHE) if CACHE else before
@@ -70,6 +164,15 @@ def _own_cache_folder():
         yield
     finally:
         settings.CACHE_DIR = before
+
+
+def _compiled(function: Callable, **options: Any) -> Any:
+    """A kernel that Python calls; kept on disk where there is a place for it."""
+    dispatcher: Any = numba.njit(**_OPTIONS, **options)(function)
+    if CACHE is not None and not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
+        with _own_cache_folder():
+            dispatcher._cache = _SealedCache(function)
+    return dispatcher
 
 
 def inlined(function: Callable) -> Callable:
@@ -84,19 +187,29 @@ def helper(function: Callable) -> Callable:
 
 def kernel(function: Callable) -> Callable:
     """Compile a serial kernel that Python calls; kept on disk."""
-    with _own_cache_folder():
-        return numba.njit(cache=CACHE is not None, **_OPTIONS)(function)
+    return _compiled(function)
+
+
+# One parallel kernel at a time: each takes all threads anyway, and of numba's threading layers workqueue, the one that
+# is always there, ends the process when two threads call at once.
+_ONE_AT_A_TIME = threading.Lock()
 
 
 def parallel_kernel(function: Any) -> Callable:
     """Compile the parallel build (`numba.prange`) of a loop; kept on disk.
 
-    numba files compiled code under the name of the function and does not tell the two builds apart, so this one
-    gets a name of its own.
+    Calls of several threads wait for each other. numba files compiled code under the name of the
+    function and does not tell the two builds apart, so this one gets a name of its own.
     """
     name = function.__name__ + "_parallel"
     twin = FunctionType(function.__code__, function.__globals__, name, function.__defaults__, function.__closure__)
     twin.__qualname__ = name
     twin.__doc__ = function.__doc__
-    with _own_cache_folder():
-        return numba.njit(cache=CACHE is not None, parallel=True, **_OPTIONS)(twin)
+    dispatcher = _compiled(twin, parallel=True)
+
+    @wraps(twin)
+    def run(*arguments: Any) -> None:
+        with _ONE_AT_A_TIME:
+            dispatcher(*arguments)
+
+    return run

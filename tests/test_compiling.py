@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from towatlas.kernels import compiling
 
 PROBE = """
@@ -78,11 +80,69 @@ def test_without_a_writable_cache(tmp_path):
     assert value == value
 
 
-def test_both_builds_of_a_loop_are_kept_apart():
-    from towatlas.kernels.sweeps import march_parallel, solve_folds_parallel
+def run(code, cache, **environment):
+    """Run Python in a process of its own; its output, and what it said on stderr."""
+    everything = os.environ | {"NUMBA_CACHE_DIR": str(cache)} | environment
+    done = subprocess.run([sys.executable, "-c", code], env=everything, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout, done.stderr
 
-    names = {march_parallel.py_func.__qualname__, solve_folds_parallel.py_func.__qualname__}
-    assert names == {"_march_parallel", "_solve_folds_parallel"}
+
+SHOT = """
+import numpy as np
+from towatlas.kernels.scan import forward_shots
+one, out = np.ones(1), [np.empty(1) for _ in range(3)]
+forward_shots(one, one, one, one, 10, *out, 0, 1)
+print(repr(out[0][0]), sum(forward_shots.stats.cache_hits.values()))
+"""
+
+
+def cut(content):
+    return content[: len(content) // 2]
+
+
+def flip(content):
+    return content[:-200] + bytes([content[-200] ^ 1]) + content[-199:]
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", [cut, flip, lambda content: b"", lambda content: b"x" * 100])
+def test_damaged_cache_is_made_again(tmp_path, ending, damage):
+    """One line says so, once; the answer is that of the whole kernel, and the next process finds one."""
+    value, hits = run(SHOT, tmp_path)[0].split()
+    assert hits == "0"
+    (file,) = tmp_path.rglob(f"scan.forward_shots-*.{ending}")
+    file.write_bytes(damage(file.read_bytes()))
+    out, err = run(SHOT, tmp_path)
+    assert out.split() == [value, "0"]
+    assert err.startswith("towatlas: ")
+    assert "is damaged" in err
+    assert err.count("\n") == 1
+    assert run(SHOT, tmp_path) == (f"{value} 1\n", "")
+
+
+def test_threads_share_the_layer_that_allows_no_two_at_once():
+    """numba's workqueue aborts the process when two threads call parallel kernels at the same time."""
+    code = """
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np, towatlas
+lam = np.geomspace(5.0, 50.0, 2000)
+alone = towatlas.solve_critical(lam, 1.0).gamma
+with ThreadPoolExecutor(4) as pool:
+    together = list(pool.map(lambda _: towatlas.solve_critical(lam, 1.0).gamma, range(12)))
+print(all(np.array_equal(one, alone) for one in together))
+import numba
+print(numba.threading_layer())
+"""
+    cache = os.environ.get("NUMBA_CACHE_DIR", Path.home() / ".cache")
+    assert run(code, cache, NUMBA_THREADING_LAYER="workqueue")[0].split() == ["True", "workqueue"]
+
+
+def test_listener_hears_of_what_is_compiled_and_not_of_what_is_found(tmp_path):
+    code = "from towatlas.kernels import notice; heard = []; notice.listen(heard.append)" + SHOT + "print(heard)"
+    first, second = (run(code, tmp_path)[0].splitlines()[1] for _ in range(2))
+    assert first == "['forward_shots']"
+    assert second == "[]"
 
 
 def test_stale_caches_are_deleted(tmp_path, monkeypatch):

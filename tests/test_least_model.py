@@ -1,7 +1,6 @@
 """The least model: what each question needs on the report's systems, and what breaks each comparison."""
 
 import json
-import sys
 import tomllib
 from dataclasses import replace
 from math import inf, nan
@@ -15,16 +14,13 @@ from test_scene import changed
 
 import towatlas
 from benchmarks import models
-from towatlas.commands.common import announce_lanes
 from towatlas.commands.scene import text_of
 from towatlas.report.page import PHOTOGRAPHS
 from towatlas.scene.answers import answer_scene
 from towatlas.scene.file import make_scene, read_scene
 from towatlas.scene.model_folds import ModelFolds, follow_folds, model_folds
 from towatlas.scene.models import QUESTIONS, check_questions, choose, compare, least_model, solvable_models, solve_model
-from towatlas.solve.depths import cables_to_depth, needs_lanes
 from towatlas.solve.drag_shots import System
-from towatlas.solve.members import shoot_lanes
 
 HANGS = ("nodes", "position", "tension")
 PAGE = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text()
@@ -263,24 +259,3 @@ def test_page_says_what_is_chosen():
     rows = [line.split(" | ") for line in PAGE.splitlines() if line.startswith("| skop-fig")]
     assert ["".join(row[k].strip(" |")[0] for row in rows) for k in (6, 7, 8)] == ["vvvvaavv", "vavvaaav", "vvvvaavv"]
     assert {row[k].strip(" |") for row in rows for k in (9, 10)} == {"air"}
-
-
-@pytest.mark.parametrize(("gamma", "many"), [(1.0, False), (10.0, True)])
-def test_the_kernel_of_many_lanes_is_announced_where_it_is_used(monkeypatch, gamma, many):
-    cable = 300.0, 0.0, gamma
-    used, said = [], []
-
-    def lanes(*arguments):
-        used.append(1)
-        return shoot_lanes(*arguments)
-
-    # The function of the same name hides the module.
-    monkeypatch.setattr(sys.modules["towatlas.solve.equilibria"], "shoot_lanes", lanes)
-    monkeypatch.setattr("towatlas.commands.common.announce_compilation", said.append)
-    announce_lanes(*cable)
-    towatlas.equilibria(*cable)
-    assert (said, bool(used)) == (["march"] if many else [], many)
-    used.clear()
-    monkeypatch.setattr("towatlas.solve.depths.shoot_lanes", lanes)
-    cables_to_depth(0.0, gamma, 200.0, 300.0)
-    assert bool(used) == needs_lanes(0.0, gamma, 300.0) == many

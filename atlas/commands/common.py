@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from towatlas.kernels import notice
 from towatlas.tables.critical import default_path
 
 OK, FAILED, USAGE, OUTSIDE, NO_STATE, FILE = 0, 1, 2, 3, 4, 5
@@ -98,17 +99,13 @@ def say(message: str) -> None:
     print(f"towatlas: {message}", file=sys.stderr)
 
 
-def announce_compilation(kernel: str, seconds: int = 20) -> None:
-    """Say so before a kernel is compiled, which happens once after installation."""
-    from towatlas.kernels.compiling import CACHE
+def announce_compilation() -> None:
+    """Have the first kernel that is compiled say so: who waits is told why."""
+    said: list[str] = []
 
-    if CACHE is None or not any(CACHE.rglob(f"*.{kernel}-*.nbi")):
-        say(f"compiling, once after installation: this takes some {seconds} s")
+    def announce(kernel: str) -> None:
+        if not said:
+            say("compiling, once after installation: this takes some seconds, for some commands half a minute")
+        said.append(kernel)
 
-
-def announce_lanes(lam: float, w_f: float, gamma: float) -> None:
-    """Say so before a cable with very many nodes has the kernel of many lanes compiled."""
-    from towatlas.solve.equilibria import needs_lanes
-
-    if needs_lanes(lam, w_f, gamma):
-        announce_compilation("march")
+    notice.listen(announce)

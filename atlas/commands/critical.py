@@ -13,7 +13,6 @@ from towatlas.commands.common import (
     OK,
     OUTSIDE,
     add_atlas,
-    announce_compilation,
     drag,
     length,
     order,
@@ -71,8 +70,6 @@ def _run(options: argparse.Namespace) -> int:
     if options.n is None and existing > limit:
         remedy = "name one with --n" if options.solve else "the atlas ends there, --solve --n N solves any"
         say(f"lambda = {lam:g} has {existing} transitions; the first {limit} follow ({remedy})")
-    if atlas is None:
-        announce_compilation("solve_folds")
     states = solve_critical(lam, w_f, orders) if atlas is None else atlas.states(lam, w_f, orders, outside="nan")
     print(_as_json(states) if options.json else _as_table(states), end="")
     return _verdict(states, lam, w_f, atlas)
@@ -84,7 +81,6 @@ def _run_drag(options: argparse.Namespace) -> int:
     orders = np.arange(1, min(existing, MOST_WITH_DRAG) + 1) if options.n is None else np.array([options.n])
     cable = options.lam, options.wf, options.C, orders
     if options.solve:
-        announce_compilation("shoot_drag", 10)
         folds: Any = solve_drag_folds(*cable)
     else:
         folds = open_drag(options.atlas).folds(*cable, outside="nan")

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from towatlas.commands.common import NO_STATE, OK, add_atlas, announce_compilation, say
+from towatlas.commands.common import NO_STATE, OK, add_atlas, say
 from towatlas.commands.scene import add_speed, atlas_if_any, describe_speed, quantity, scene_of
-from towatlas.scene.answers import Design, design, longest_searched
+from towatlas.scene.answers import Design, design
 from towatlas.scene.models import Choice
 from towatlas.scene.scene import MODELS
-from towatlas.solve.depths import needs_lanes
 from towatlas.solve.equilibria import equilibria
 
 
@@ -48,22 +47,16 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     scene = scene_of(options.scene, options)
     atlas = atlas_if_any(options.atlas)
-    announce_compilation("shoot_each", 5)
-    groups = scene.groups("vacuum")
-    longest = longest_searched(scene, options.depth, options.max_length)
-    if needs_lanes(groups.w_f, groups.gamma, longest / scene.radius):
-        announce_compilation("march")
     found = design(
         scene,
         options.depth,
         options.max_radius,
         options.max_length,
         atlas,
-        lambda: announce_compilation("solve_folds"),
     )
     choices = {}
     if options.model != "vacuum":
-        choices = found.choices(options.model, lambda: announce_compilation("shoot_drag", 10))
+        choices = found.choices(options.model)
     rows = _rows(found, choices)
     reason = None if rows else _reason(found)
     if options.json:

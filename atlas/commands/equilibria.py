@@ -4,7 +4,7 @@ import argparse
 import json
 from typing import Any
 
-from towatlas.commands.common import OK, announce_compilation, announce_lanes, drag, length, number, say, speed, weight
+from towatlas.commands.common import OK, drag, length, number, say, speed, weight
 from towatlas.nomenclature import SYMBOLS
 from towatlas.solve.drag_equilibria import DragEquilibria
 from towatlas.solve.equilibria import equilibria
@@ -37,12 +37,8 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    announce_compilation("shoot_each", 5)
-    announce_lanes(options.lam, options.wf, options.gamma)
     given = {name: getattr(options, name) for name in ("C", "m_f", "C_f", "w", "C_t")}
     given = {name: value for name, value in given.items() if value is not None}
-    if given:
-        announce_compilation("shoot_drag", 10)
     found = equilibria(options.lam, options.wf, options.gamma, **given)
     if isinstance(found, DragEquilibria):
         return _print_drag(found, options.json)

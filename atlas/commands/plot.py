@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from towatlas.commands.common import FIGURE_FORMATS, OK, add_atlas, announce_compilation, new_figure, save_figure
+from towatlas.commands.common import FIGURE_FORMATS, OK, add_atlas, new_figure, save_figure
 from towatlas.tables.critical import open_atlas
 
 
@@ -25,7 +25,6 @@ def _run(options: argparse.Namespace) -> int:
     if options.out.suffix.lower() not in FIGURE_FORMATS:
         raise ValueError(f"--out {options.out}: the ending must be one of {', '.join(FIGURE_FORMATS)}")
     if options.figure == "drag":
-        announce_compilation("shoot_drag", 10)
         figure, axes = new_figure(7.2, 4.8)
         from towatlas.plot.drag_folds import plot_drag_folds
 

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from towatlas.commands.common import OK, announce_compilation, say
+from towatlas.commands.common import OK, say
 
 
 def add(commands: Any) -> None:
@@ -24,7 +24,6 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     if options.out.suffix.lower() not in (".html", ".htm"):
         raise ValueError(f"--out {options.out}: the ending must be .html or .htm")
-    announce_compilation("shoot_drag")
     from towatlas.report.page import write_report
 
     say(f"wrote {write_report(options.out)}")

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from towatlas.commands.common import OK, add_atlas, announce_compilation, announce_lanes, say
+from towatlas.commands.common import OK, add_atlas, say
 from towatlas.commands.common import speed as dimensionless_speed
 from towatlas.kernels import status
 from towatlas.scene.answers import Jumps, SceneAnswer, answer_scene
@@ -96,17 +96,11 @@ def atlas_if_any(path: Path) -> Atlas | None:
 def _run(options: argparse.Namespace) -> int:
     scene = scene_of(options.file, options)
     atlas = atlas_if_any(options.atlas)
-    announce_compilation("shoot_each", 5)
-    groups = scene.groups("vacuum")
-    if math.isfinite(groups.lam):
-        announce_lanes(groups.lam, groups.w_f, groups.gamma)
     answer = answer_scene(
         scene,
         atlas,
-        lambda: announce_compilation("solve_folds"),
         options.model,
         options.asked,
-        lambda: announce_compilation("shoot_drag", 10),
     )
     print(json.dumps(_object(answer), indent=1) if options.json else text_of(answer))
     for code in {int(code) for code in answer.jumps.status} - {status.OK}:

@@ -10,8 +10,6 @@ import numpy as np
 from towatlas.commands.common import (
     FIGURE_FORMATS,
     OK,
-    announce_compilation,
-    announce_lanes,
     length,
     new_figure,
     number,
@@ -56,8 +54,6 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueError(f"--out {options.out}: the ending must be one of {', '.join(FORMATS)}")
     if options.points < 2:
         raise ValueError(f"--points {options.points}: a shape has two points or more")
-    announce_compilation("shoot_each", 5)
-    announce_lanes(options.lam, options.wf, options.gamma)
     root = int(options.root) if options.root.isdecimal() else options.root
     arc = options.s if options.s else np.linspace(0.0, options.lam, options.points)
     curve = shape(options.lam, options.wf, options.gamma, root=root, s=arc)

@@ -1,6 +1,6 @@
 """What is asked about a scene: its critical speeds, its shapes, and the cables that bring the fish to a depth."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,7 +93,7 @@ class Design:
         passed = np.array([int(np.sum(jumps.gamma < self.scene.gamma)) for jumps in self.jumps], int)
         return (self.cables.nodes == passed) & ~self.cables.outer
 
-    def choices(self, model: str | None = None, before_drag: Callable[[], object] = lambda: None) -> dict[int, Choice]:
+    def choices(self, model: str | None = None) -> dict[int, Choice]:
         """The least model for nodes, position and tension of each cable chosen that is a median one, by row.
 
         Parameters, errors as `towatlas.scene.models.least_model`.
@@ -103,7 +103,6 @@ class Design:
                 replace(self.scene, length=float(self.cables.lam[k]) * self.scene.radius),
                 model,
                 DESIGN_QUESTIONS,
-                before_drag=before_drag,
             )
             for k in np.flatnonzero(self.chosen & self.median)
         }
@@ -114,7 +113,6 @@ def critical_speeds(
     w_f: float,
     gamma: float,
     atlas: Atlas | None = None,
-    before_solving: Callable[[], object] = lambda: None,
 ) -> Jumps:
     """Critical speeds of a cable, the lowest six and on, until they leave a speed behind by 10 %.
 
@@ -124,15 +122,13 @@ def critical_speeds(
         The cable and the speed, dimensionless.
     atlas : Atlas, optional
         Where they are looked up if it holds them; what it does not hold is solved directly.
-    before_solving : callable
-        Called before anything is solved directly, which the first time is compiled.
     """
     existing = transitions(lam, w_f)
     parts: list[dict[str, NDArray]] = []
     first = 1
     while first <= existing:
         n = np.arange(first, min(first + BLOCK, existing + 1))
-        parts.append(_block(lam, w_f, n, atlas, before_solving))
+        parts.append(_block(lam, w_f, n, atlas))
         highest = parts[-1]["gamma"][-1]
         # One that fails lies at its threshold, where critical speeds are boundless.
         if not highest <= gamma * (1.0 + NEAR):
@@ -145,9 +141,7 @@ def critical_speeds(
     return Jumps(**columns, existing=existing)
 
 
-def _block(
-    lam: float, w_f: float, n: NDArray[np.int64], atlas: Atlas | None, before_solving: Callable[[], object]
-) -> dict[str, NDArray]:
+def _block(lam: float, w_f: float, n: NDArray[np.int64], atlas: Atlas | None) -> dict[str, NDArray]:
     names = ("gamma", "error", "status")
     if atlas is None:
         there = np.zeros(len(n), bool)
@@ -157,7 +151,6 @@ def _block(
         there = states.status != status.OUTSIDE
         columns = {name: getattr(states, name).copy() for name in names}
     if not there.all():
-        before_solving()
         solved = solve_critical(lam, w_f, n[~there])
         for name in names:
             columns[name][~there] = getattr(solved, name)
@@ -167,10 +160,8 @@ def _block(
 def answer_scene(
     scene: Scene,
     atlas: Atlas | None = None,
-    before_solving: Callable[[], object] = lambda: None,
     model: str | None = None,
     asked: Sequence[str] = QUESTIONS,
-    before_drag: Callable[[], object] = lambda: None,
 ) -> SceneAnswer:
     """Critical speeds and equilibria of a scene, by the least model that answers what is asked.
 
@@ -179,9 +170,7 @@ def answer_scene(
     scene : Scene
     atlas : Atlas, optional
         Where critical speeds are looked up if it holds them.
-    before_solving : callable
-        See `critical_speeds`.
-    model, asked, before_drag
+    model, asked
         See `towatlas.scene.models.least_model`.
 
     Raises
@@ -201,7 +190,7 @@ def answer_scene(
     groups = scene.groups("vacuum")
     if not np.isfinite(groups.lam):
         raise ValueError(f"{scene.source}: cable.length is missing; a design finds one: towatlas design --help")
-    jumps = critical_speeds(groups.lam, groups.w_f, groups.gamma, atlas, before_solving)
+    jumps = critical_speeds(groups.lam, groups.w_f, groups.gamma, atlas)
     passed = int(np.sum(jumps.gamma < groups.gamma))
     # The pairs that decide where the cable jumps, as it slows down and speeds up; one more should the second be gone.
     there = (jumps.n >= passed) & (jumps.n <= passed + 2)
@@ -212,7 +201,6 @@ def answer_scene(
         orders=jumps.n[there].tolist(),
         vacuum=jumps.gamma[there].tolist(),
         compared=[n for n in (passed, passed + 1) if n in jumps.n],
-        before_drag=before_drag,
     )
     return SceneAnswer(scene=scene, jumps=jumps, choice=choice)
 
@@ -228,7 +216,6 @@ def design(
     max_radius: float = np.inf,
     max_length: float | None = None,
     atlas: Atlas | None = None,
-    before_solving: Callable[[], object] = lambda: None,
 ) -> Design:
     """Cable lengths that put the fish at a depth, by the vacuum model; the length of the scene is not used.
 
@@ -241,7 +228,7 @@ def design(
         How far from the axis the fish may be [m], > 0.
     max_length : float, optional
         Longest cable searched [m]; without it 10 times the distance from the tow point to the axis at that depth.
-    atlas, before_solving
+    atlas
         See `critical_speeds`.
 
     Returns
@@ -269,5 +256,5 @@ def design(
         longest=longest,
         cables=cables,
         chosen=np.abs(cables.x_f) * scene.radius <= max_radius,
-        jumps=[critical_speeds(float(lam), groups.w_f, groups.gamma, atlas, before_solving) for lam in cables.lam],
+        jumps=[critical_speeds(float(lam), groups.w_f, groups.gamma, atlas) for lam in cables.lam],
     )

@@ -4,7 +4,7 @@ A model is kept if its answers are those of every larger one within the scene's 
 would not do: to a cable towed slowly in water drag adds nothing, buoyancy much.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from math import inf, isfinite, isnan, nan
 
@@ -244,7 +244,6 @@ def least_model(
     orders: Sequence[int] = (),
     vacuum: Sequence[float] = (),
     compared: Sequence[int] = (),
-    before_drag: Callable[[], object] = lambda: None,
 ) -> Choice:
     """The least model whose answers to what is asked are those of all larger ones within the scene's tolerance.
 
@@ -260,8 +259,6 @@ def least_model(
         See `solve_model`.
     compared : sequence of int
         Those of `orders` that are compared.
-    before_drag : callable
-        Called before anything with drag is solved, which the first time is compiled.
 
     Raises
     ------
@@ -275,8 +272,6 @@ def least_model(
     missing = [name for name, value in vars(scene.groups(known[-1])).items() if isnan(value)]
     if missing:
         raise ValueError(f"the {known[-1]} model needs {', '.join(missing)}, for which keys of the scene are missing")
-    if known != ["vacuum"]:
-        before_drag()
     with_speeds = "speeds" in asked
     orders = orders if with_speeds else ()
     answers = [_solved(scene, name, orders, vacuum, len(known) > 1) for name in known]

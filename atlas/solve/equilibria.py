@@ -182,12 +182,6 @@ def _failure(lam: float, w_f: float, gamma: float, code: int) -> ArithmeticError
     return ArithmeticError(f"lam = {lam:g}, w_f = {w_f:g}, gamma = {gamma:g}: {status.SENTENCES[code]}")
 
 
-def needs_lanes(lam: float, w_f: float, gamma: float) -> bool:
-    """Whether a cable has so many nodes that `vacuum_equilibria` takes the kernel of many lanes; errors as there."""
-    last, code = _highest(w_f, lam, gamma)
-    return code == status.OK and last > FEW
-
-
 # What overflows becomes a status of the shots.
 @np.errstate(over="ignore", invalid="ignore")
 def _highest(w_f: float, lam: float, gamma: float) -> tuple[int, int]:
