@@ -13,7 +13,7 @@ help:  ## list the targets
 install: $(VENV)/installed  ## make .venv and install the package into it
 
 $(VENV)/installed: pyproject.toml
-	$(PYTHON) -c 'import sys; sys.exit("towatlas needs Python 3.11 or later, this is " + sys.version.split()[0] if sys.version_info < (3, 11) else 0)'
+	$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if (3, 11) <= v < (3, 14) else "towatlas needs Python 3.11 to 3.13, this is %d.%d" % v)'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[test,bench,check]'
 	@touch $@
