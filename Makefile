@@ -44,7 +44,7 @@ check: install  ## ruff, types, import layers
 	rm -rf build/tree && mkdir -p build/tree/towatlas
 	ln -s $(CURDIR)/atlas/* $(CURDIR)/kernels build/tree/towatlas/
 	$(BIN)/mypy
-	PYTHONPATH=build/tree $(BIN)/lint-imports
+	PYTHONPATH=build/tree $(BIN)/lint-imports --no-logo
 
 figures: install  ## draw the figures of the README from build/atlas.nc, and of NRL Report 7048 (build/report.html)
 	@test -f $(ATLAS) || $(MAKE) --no-print-directory atlas
