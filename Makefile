@@ -19,13 +19,13 @@ $(VENV)/installed: pyproject.toml
 	@touch $@
 
 atlas: install  ## build build/atlas.nc
-	$(BIN)/python -m atlas build --out $(ATLAS)
+	$(BIN)/python -m towatlas build --out $(ATLAS)
 
 equilibria: install  ## build build/equilibria.nc, the table of fish positions
-	$(BIN)/python -m atlas build --equilibria
+	$(BIN)/python -m towatlas build --equilibria
 
 drag: install  ## build build/atlas.nc with the folds with drag in it; some minutes
-	$(BIN)/python -m atlas build --drag --out $(ATLAS)
+	$(BIN)/python -m towatlas build --drag --out $(ATLAS)
 
 test: install  ## run the tests
 	$(BIN)/python -m pytest
@@ -48,9 +48,9 @@ check: install  ## ruff, types, import layers
 
 figures: install  ## draw the figures of the README from build/atlas.nc, and of NRL Report 7048 (build/report.html)
 	@test -f $(ATLAS) || $(MAKE) --no-print-directory atlas
-	$(BIN)/python -m atlas plot critical --atlas $(ATLAS) --out docs/critical.svg
-	$(BIN)/python -m atlas plot critical --atlas $(ATLAS) --out docs/critical.png
-	$(BIN)/python -m atlas report --out build/report.html
+	$(BIN)/python -m towatlas plot critical --atlas $(ATLAS) --out docs/critical.svg
+	$(BIN)/python -m towatlas plot critical --atlas $(ATLAS) --out docs/critical.png
+	$(BIN)/python -m towatlas report --out build/report.html
 
 clean:  ## remove .venv, build and caches
 	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
