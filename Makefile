@@ -5,14 +5,15 @@ BIN := $(VENV)/bin
 ATLAS := build/atlas.nc
 
 .DEFAULT_GOAL := help
-.PHONY: help install atlas equilibria drag test bench failures check figures clean
+.PHONY: help install atlas equilibria drag test bench failures types check figures clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
 
 install: $(VENV)/installed  ## make .venv and install the package into it
 
-$(VENV)/installed: pyproject.toml
+# atlas/__init__.py holds the version, which the installation records.
+$(VENV)/installed: pyproject.toml atlas/__init__.py
 	$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if (3, 11) <= v < (3, 14) else "towatlas needs Python 3.11 to 3.13, this is %d.%d" % v)'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[test,bench,check]'
@@ -38,12 +39,14 @@ bench: install  ## chart error against time, compare the ratios, update docs and
 failures: install  ## map where methods fail, write the figure and the tables of docs/failures.md
 	$(BIN)/python -m benchmarks.failures
 
-check: install  ## ruff, types, import layers
+types: install  ## mypy, on the package laid out as it is installed
+	@rm -rf build/tree && mkdir -p build/tree/towatlas
+	@ln -s $(CURDIR)/atlas/* $(CURDIR)/kernels build/tree/towatlas/
+	$(BIN)/mypy
+
+check: types  ## ruff, types, import layers
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	rm -rf build/tree && mkdir -p build/tree/towatlas
-	ln -s $(CURDIR)/atlas/* $(CURDIR)/kernels build/tree/towatlas/
-	$(BIN)/mypy
 	PYTHONPATH=build/tree $(BIN)/lint-imports --no-logo
 
 figures: install  ## draw the figures of the README from build/atlas.nc, and of NRL Report 7048 (build/report.html)
