@@ -169,6 +169,24 @@ def test_promised_pythons_are_the_classifiers():
     assert PROJECT["tool"]["ruff"]["target-version"] == f"py3{first}"
 
 
+def test_only_pythons_that_are_what_their_name_says_are_found(tmp_path):
+    """On a machine with none, with one, and with one under another's name: what is missing is named."""
+    mine, other = f"3.{sys.version_info[1]}", "3.12" if sys.version_info[1] != 12 else "3.11"
+
+    def look(asked):
+        environment = {"PATH": str(tmp_path), "HOME": str(tmp_path), "TOWATLAS_PYTHONS": asked}
+        done = subprocess.run([sys.executable, ROOT / ".ci" / "pythons.py"], env=environment, capture_output=True)
+        return done.returncode, done.stdout.decode(), done.stderr.decode()
+
+    assert look("")[:2] == (1, "")
+    for version in (mine, other):
+        (tmp_path / f"python{version}").symlink_to(sys.executable)
+    assert look(mine) == (0, f"{mine} {tmp_path}/python{mine}\n", "")
+    code, out, complaint = look(f"{mine} {other}")
+    assert (code, out) == (1, "")
+    assert complaint.startswith(f"pyproject promises Python {other}, not found on this machine")
+
+
 PLANT = '''
 
 @helper
