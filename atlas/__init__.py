@@ -1,48 +1,73 @@
 """towatlas: critical speeds of a cable towed in a circle, computed, stored as a NetCDF atlas, looked up.
 
-Importing this package, opening an atlas and looking a value up need numpy and netCDF4 only; what computes
-(`solve_critical`) imports numba when it is first called.
+Names are imported when they are first used: opening an atlas and looking a value up need numpy and netCDF4 only.
 """
 
-from towatlas.limits import excess_length, massless_cable, threshold_length
-from towatlas.scene.answers import answer_scene, design
-from towatlas.scene.file import read_scene
-from towatlas.solve.critical import CriticalStates, solve_critical
-from towatlas.solve.drag_equilibria import DragEquilibria
-from towatlas.solve.drag_folds import DragFolds, solve_drag_folds
-from towatlas.solve.drag_shapes import DragShape, drag_shape
-from towatlas.solve.equilibria import Equilibria, equilibria
-from towatlas.solve.shapes import shape
-from towatlas.tables.critical import Atlas, open_atlas
-from towatlas.tables.drag_folds import DragLookup, DragTable, open_drag
-from towatlas.tables.fish import EquilibriaTable, FishPositions, open_equilibria
-from towatlas.tables.seal import AtlasFileError
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from towatlas.limits import excess_length, massless_cable, threshold_length
+    from towatlas.results import CriticalStates, DragFolds, Equilibria, FishPositions
+    from towatlas.scene.designs import design
+    from towatlas.scene.file import read_scene
+    from towatlas.scene.jumps import answer_scene
+    from towatlas.solve.critical import solve_critical
+    from towatlas.solve.drag_folds import solve_drag_folds
+    from towatlas.solve.equilibria import equilibria
+    from towatlas.solve.shapes import shape, shape_of
+    from towatlas.system import System
+    from towatlas.tables.atlas import Atlas, open_atlas
+    from towatlas.tables.seal import AtlasFileError
 
 __version__ = "0.1.0"
 __all__ = [
     "Atlas",
     "AtlasFileError",
     "CriticalStates",
-    "DragEquilibria",
     "DragFolds",
-    "DragLookup",
-    "DragShape",
-    "DragTable",
     "Equilibria",
-    "EquilibriaTable",
     "FishPositions",
+    "System",
     "answer_scene",
     "design",
-    "drag_shape",
     "equilibria",
     "excess_length",
     "massless_cable",
     "open_atlas",
-    "open_drag",
-    "open_equilibria",
     "read_scene",
     "shape",
+    "shape_of",
     "solve_critical",
     "solve_drag_folds",
     "threshold_length",
 ]
+
+# Where each public name lives.
+_HOMES = {
+    "limits": ("excess_length", "massless_cable", "threshold_length"),
+    "results": ("CriticalStates", "DragFolds", "Equilibria", "FishPositions"),
+    "scene.designs": ("design",),
+    "scene.file": ("read_scene",),
+    "scene.jumps": ("answer_scene",),
+    "solve.critical": ("solve_critical",),
+    "solve.drag_folds": ("solve_drag_folds",),
+    "solve.equilibria": ("equilibria",),
+    "solve.shapes": ("shape", "shape_of"),
+    "system": ("System",),
+    "tables.atlas": ("Atlas", "open_atlas"),
+    "tables.seal": ("AtlasFileError",),
+}
+_HOME = {name: module for module, names in _HOMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,7 +1,7 @@
-"""What an atlas file looks like: xarray datasets with CF attributes, written so that the bytes depend on nothing else.
+"""CF attributes: what the variables and files of towatlas say of themselves, as xarray datasets.
 
-Root: the plain table on the grid (n, w_f, lam). Group support/interpolant: Chebyshev series for lookup. Group
-support/witness: critical speeds of some cables by an independent method.
+Root of an atlas: the plain table on the grid (n, w_f, lam). Group support/interpolant: Chebyshev series for lookup.
+Group support/witness: critical speeds of some cables by an independent method.
 """
 
 from typing import Any
@@ -18,7 +18,18 @@ WITNESS = "support/witness"
 
 
 def symbol_attributes(name: str, symbols: dict[str, Symbol] = SYMBOLS) -> dict[str, Any]:
-    """CF attributes of a quantity of the nomenclature."""
+    """CF attributes of a quantity of the nomenclature.
+
+    Parameters
+    ----------
+    name : str
+    symbols : dict of Symbol
+        In which it is looked up.
+
+    Returns
+    -------
+    dict
+    """
     symbol = symbols[name]
     attributes: dict[str, Any] = {"long_name": symbol.long_name, "references": symbol.source}
     if name == "status":
@@ -29,27 +40,67 @@ def symbol_attributes(name: str, symbols: dict[str, Symbol] = SYMBOLS) -> dict[s
 
 
 def variable(dims: tuple[str, ...], name: str, data: NDArray[Any], **attributes: Any) -> xr.Variable:
-    """A variable with the CF attributes of quantity `name`, and others."""
+    """A variable with the CF attributes of a quantity.
+
+    Parameters
+    ----------
+    dims : tuple of str
+    name : str
+        Of the quantity, in `nomenclature.SYMBOLS`.
+    data : ndarray
+    **attributes : object
+        Others.
+
+    Returns
+    -------
+    xarray.Variable
+    """
     if name == "n":
         data = np.asarray(data, np.int32)
     return xr.Variable(dims, data, symbol_attributes(name) | attributes)
 
 
 def equilibrium_variable(dims: tuple[str, ...], name: str, data: NDArray[Any], **attributes: Any) -> xr.Variable:
-    """The same for a quantity of any equilibrium."""
+    """The same for a quantity of any equilibrium.
+
+    Parameters
+    ----------
+    dims : tuple of str
+    name : str
+        Of the quantity, in `nomenclature.EQUILIBRIUM`.
+    data : ndarray
+    **attributes : object
+        Others.
+
+    Returns
+    -------
+    xarray.Variable
+    """
     return xr.Variable(dims, data, symbol_attributes(name, EQUILIBRIUM) | attributes)
 
 
 def plain_table(
+    *,
     n: NDArray[np.int64],
-    w_f: NDArray[np.float64],
     lam: NDArray[np.float64],
+    w_f: NDArray[np.float64],
     lambda_c: NDArray[np.float64],
     table: dict[str, NDArray[Any]],
 ) -> xr.Dataset:
     """The root of the file: every quantity on the grid (n, w_f, lam), each in its own variable.
 
-    `table` holds the quantities with shape (n, w_f, lam); gamma and R_x0 are stored as gamma_c and R_x0_c.
+    Parameters
+    ----------
+    n : ndarray of int, shape (n,)
+    w_f, lam : ndarray, shape (w_f,), (lam,)
+        The axes.
+    lambda_c : ndarray, shape (n, w_f)
+    table : dict of ndarray, shape (n, w_f, lam)
+        The quantities; gamma and R_x0 are stored as gamma_c and R_x0_c.
+
+    Returns
+    -------
+    xarray.Dataset
     """
     dims = ("n", "w_f", "lam")
     renamed = {"gamma": "gamma_c", "R_x0": "R_x0_c"}
@@ -84,7 +135,18 @@ def _attributes(title: str, source: str, comment: str, method: str, extra: dict[
 
 
 def root_attributes(method: str, extra: dict[str, Any]) -> dict[str, Any]:
-    """Global attributes that say what the file is."""
+    """Global attributes that say what the file is.
+
+    Parameters
+    ----------
+    method : str
+    extra : dict
+        Others.
+
+    Returns
+    -------
+    dict
+    """
     return _attributes(
         "Critical speeds of a cable towed in a circle, in a vacuum",
         f"towatlas, method {method}",
@@ -100,7 +162,17 @@ def root_attributes(method: str, extra: dict[str, Any]) -> dict[str, Any]:
 
 
 def equilibria_attributes(extra: dict[str, Any]) -> dict[str, Any]:
-    """Global attributes of a table of equilibria."""
+    """Global attributes of a table of equilibria.
+
+    Parameters
+    ----------
+    extra : dict
+        Others.
+
+    Returns
+    -------
+    dict
+    """
     return _attributes(
         "Equilibria of a cable towed in a circle, in a vacuum",
         "towatlas, equilibria by the count of zeros of the first variation",
@@ -115,13 +187,23 @@ def equilibria_attributes(extra: dict[str, Any]) -> dict[str, Any]:
 
 
 def shape_attributes(facts: dict[str, Any]) -> dict[str, Any]:
-    """Global attributes of the shape of one equilibrium."""
+    """Global attributes of the shape of one equilibrium.
+
+    Parameters
+    ----------
+    facts : dict
+        Others.
+
+    Returns
+    -------
+    dict
+    """
     return _attributes(
-        "Shape of a cable towed in a circle, in a vacuum",
+        "Shape of a cable towed in a circle",
         "towatlas, shots from the fish up",
         "Dimensionless: lengths over the tow radius R, forces over (mu + rho A) g R. At the tow point "
-        "s = 0, x = 1, z = 0; the fish is at s = lam. s_node and z_node are where the cable passes the axis. error "
-        "is the estimated relative error of x_f.",
+        "s = 0, x = 1, y = 0, z = 0, which moves along y; the fish is at s = lam. s_node and z_node are where x "
+        "changes sign. error is the estimated relative error of the distance of the fish from the axis.",
         "shape",
         facts,
     )

@@ -14,7 +14,23 @@ def _short(value: Any) -> str:
 
 
 def check_real(name: str, value: Any) -> NDArray[np.float64]:
-    """Real numbers of any numeric dtype, as float64; masked values become nan."""
+    """Real numbers of any numeric dtype, as float64; masked values become nan.
+
+    Parameters
+    ----------
+    name : str
+        What they are called in messages.
+    value : array_like
+
+    Returns
+    -------
+    ndarray
+
+    Raises
+    ------
+    ValueError
+        For labelled arrays, and what is not real numbers.
+    """
     if hasattr(value, "dims"):
         raise ValueError(
             f"{name} is a labelled {type(value).__name__}; this function pairs by position and takes plain arrays: "
@@ -34,7 +50,21 @@ def check_real(name: str, value: Any) -> NDArray[np.float64]:
 
 
 def check_order(value: Any) -> NDArray[np.int64]:
-    """Number of a transition: whole numbers from 1."""
+    """Number of a transition: whole numbers from 1.
+
+    Parameters
+    ----------
+    value : array_like
+
+    Returns
+    -------
+    ndarray of int
+
+    Raises
+    ------
+    ValueError
+        For others.
+    """
     array = check_real("n", value)
     bad = ~((array >= 1) & (array == np.floor(array)) & (array < 2**31))
     if bad.any():
@@ -43,7 +73,23 @@ def check_order(value: Any) -> NDArray[np.int64]:
 
 
 def check_broadcast(**arrays: NDArray) -> list[NDArray]:
-    """Arrays of one common shape."""
+    """Arrays of one common shape.
+
+    Parameters
+    ----------
+    **arrays : ndarray
+        By the names that they have in messages.
+
+    Returns
+    -------
+    list of ndarray
+        Views, in the same order.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not broadcast together.
+    """
     try:
         return list(np.broadcast_arrays(*arrays.values()))
     except ValueError:
@@ -52,19 +98,66 @@ def check_broadcast(**arrays: NDArray) -> list[NDArray]:
 
 
 def check_choice(name: str, choice: Any, choices: tuple[str, ...]) -> str:
-    """One of some words."""
+    """One of some words.
+
+    Parameters
+    ----------
+    name : str
+        What is chosen, in messages.
+    choice : str
+    choices : tuple of str
+
+    Returns
+    -------
+    str
+        The choice.
+
+    Raises
+    ------
+    ValueError
+        For any other.
+    """
     if not isinstance(choice, str) or choice not in choices:
         raise ValueError(f"{name} must be one of {', '.join(choices)}; got {_short(choice)}")
     return choice
 
 
 def check_outside(choice: Any) -> str:
-    """What to do with points outside the atlas."""
+    """What to do with points outside the atlas, one of OUTSIDE_CHOICES.
+
+    Parameters
+    ----------
+    choice : str
+
+    Returns
+    -------
+    str
+        The choice.
+
+    Raises
+    ------
+    ValueError
+        For any other.
+    """
     return check_choice("outside", choice, OUTSIDE_CHOICES)
 
 
 def check_positive_finite(name: str, array: NDArray[np.float64], *, zero: bool = False) -> None:
-    """Finite and above zero everywhere (or zero itself, where that is allowed)."""
+    """Finite and above zero everywhere.
+
+    Parameters
+    ----------
+    name : str
+        What the numbers are called in messages.
+    array : ndarray
+    zero : bool
+        Whether zero is allowed, too.
+
+    Raises
+    ------
+    ValueError
+        For others.
+    """
     good = np.isfinite(array) & ((array >= 0.0) if zero else (array > 0.0))
     if not good.all():
         rule = "finite and not negative" if zero else "finite and positive"
@@ -74,7 +167,25 @@ def check_positive_finite(name: str, array: NDArray[np.float64], *, zero: bool =
 
 
 def check_one(name: str, value: Any, *, zero: bool = False) -> float:
-    """One finite number above zero (or zero itself, where that is allowed)."""
+    """One finite number above zero.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in messages.
+    value : float
+    zero : bool
+        Whether zero is allowed, too.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        For others, and for arrays.
+    """
     array = check_real(name, value)
     if array.ndim:
         raise ValueError(f"{name} must be one number, got an array of shape {array.shape}; call once for each")
@@ -82,13 +193,35 @@ def check_one(name: str, value: Any, *, zero: bool = False) -> float:
     return float(array)
 
 
-def check_root(root: Any, nodes: NDArray[np.int64], median: NDArray[np.bool_]) -> int:
-    """Row of an equilibrium named by a word or by its number in rising order of R_x0."""
-    if isinstance(root, str) and root in ("median", "outward"):
-        return int(np.flatnonzero(median if root == "median" else nodes == 0)[0])
-    if isinstance(root, (int, np.integer)) and not isinstance(root, bool) and 0 <= root < len(nodes):
-        return int(root)
+def check_root(root: Any, branch: NDArray[np.str_], expected: int, median: int = -1) -> int:
+    """Row of an equilibrium named by a word, by its branch, or by its number.
+
+    Parameters
+    ----------
+    root : str or int
+        "expected", "median", the name of a branch, or a row.
+    branch : ndarray of str, shape (equilibria,)
+        The names there are.
+    expected, median : int
+        Rows of those words; -1 for one that names none.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    ValueError
+        For what names none.
+    """
+    rows = [{"expected": expected, "median": median}.get(root, -1)] if isinstance(root, str) else []
+    rows += np.flatnonzero(branch == root).tolist() if isinstance(root, str) else []
+    if isinstance(root, (int, np.integer)) and not isinstance(root, bool):
+        rows = [int(root)]
+    for row in rows:
+        if 0 <= row < len(branch):
+            return row
     raise ValueError(
-        f"root must be median, outward or a whole number from 0 to {len(nodes) - 1}, the equilibria in rising order "
-        f"of R_x0; got {_short(root)}"
+        f"root must be expected{', median' if median >= 0 else ''}, one of the branches {', '.join(branch)}, or a "
+        f"whole number from 0 to {len(branch) - 1}, the equilibria in rising order of R_x0; got {_short(root)}"
     )

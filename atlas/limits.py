@@ -9,21 +9,54 @@ from towatlas.checks import check_broadcast, check_order, check_positive_finite,
 
 Array = NDArray[np.float64]
 
+# Fish weight at which log(1 + w_f / W_SCALE), in which critical states are smooth, turns from linear to logarithmic.
+# They have a term w_f^2 log w_f at zero: smaller, and the coordinate spans more; larger, and that term shows.
+W_SCALE = 0.03
+
 
 def threshold_offset(w_f: ArrayLike) -> Array:
-    """Offset of the fish at every threshold, sqrt(1 + w_f^2) - w_f, without cancellation."""
+    """Offset of the fish at every threshold, sqrt(1 + w_f^2) - w_f, without cancellation.
+
+    Parameters
+    ----------
+    w_f : array_like
+        Fish weight [-], >= 0; no checks.
+
+    Returns
+    -------
+    ndarray
+        Over tow radius [-], 0 to 1.
+    """
     w_f = np.asarray(w_f, float)
     with np.errstate(over="ignore"):
         return 1.0 / (w_f + np.hypot(1.0, w_f))
 
 
 def unchecked_threshold_length(w_f: ArrayLike, n: ArrayLike) -> Array:
-    """`threshold_length` of numbers already checked."""
+    """`threshold_length` of numbers already checked.
+
+    Parameters
+    ----------
+    w_f, n : array_like
+
+    Returns
+    -------
+    ndarray
+    """
     return (2.0 * np.asarray(n) - 1.0) + threshold_offset(w_f)
 
 
-def unchecked_excess_length(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike) -> Array:
-    """`excess_length` of numbers already checked, or that may be bad."""
+def unchecked_excess_length(*, lam: ArrayLike, w_f: ArrayLike, n: ArrayLike) -> Array:
+    """`excess_length` of numbers already checked, or that may be bad.
+
+    Parameters
+    ----------
+    lam, w_f, n : array_like
+
+    Returns
+    -------
+    ndarray
+    """
     return (np.asarray(lam, float) - (2.0 * np.asarray(n) - 1.0)) - threshold_offset(w_f)
 
 
@@ -67,7 +100,31 @@ def threshold_length(w_f: ArrayLike, n: ArrayLike = 1) -> Array:
 
 
 def excess_length(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Array:
-    """Cable length beyond the threshold, lambda - lambda_cn(w_f) [-]; its rounding error is that of lambda.
+    """Cable length beyond the threshold, lambda - lambda_cn(w_f); its rounding error is that of lambda.
+
+    Parameters
+    ----------
+    lam : array_like
+        Cable length over tow radius [-], > 0.
+    w_f : array_like
+        Fish weight [-], >= 0.
+    n : array_like of int
+        Number of the transition, >= 1.
+
+    Returns
+    -------
+    ndarray
+        lambda - lambda_cn [-], of the broadcast shape; there is an n-th transition where it is above zero.
+
+    Raises
+    ------
+    ValueError
+        For a lam that is not positive, a w_f that is negative, an n that is no whole number from 1, and what is not a
+        number.
+
+    References
+    ----------
+    NRL Report 7048, Eq. (36), for n = 1.
 
     Examples
     --------
@@ -78,24 +135,45 @@ def excess_length(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Array:
     check_positive_finite("lam", lam)
     check_positive_finite("w_f", w_f, zero=True)
     lam, w_f, n = check_broadcast(lam=lam, w_f=w_f, n=check_order(n))
-    return unchecked_excess_length(lam, w_f, n)
+    return unchecked_excess_length(lam=lam, w_f=w_f, n=n)
 
 
-def transitions(lam: float, w_f: float) -> int:
-    """Number of transitions that a cable has, the n with lambda > lambda_cn(w_f); no checks.
+def transitions(*, lam: float, w_f: float) -> int:
+    """Number of transitions that a cable has, the n with lambda > lambda_cn(w_f).
+
+    Parameters
+    ----------
+    lam, w_f : float
+        Cable length and fish weight [-]; no checks.
+
+    Returns
+    -------
+    int
 
     Examples
     --------
-    >>> transitions(37.8, 1352.0)
+    >>> transitions(lam=37.8, w_f=1352.0)
     19
     """
     return max(0, math.ceil(0.5 * (lam + 1.0 - float(threshold_offset(w_f)))) - 1)
 
 
 def massless_cable(lam: ArrayLike) -> Array:
-    """First critical speed gamma_c1 for w_f -> infinity, (lambda^(2/3) - 1)^(-3/4); nan for lambda <= 1.
+    """First critical speed for w_f -> infinity.
 
-    The cable is then a straight rod that carries a point mass.
+    Parameters
+    ----------
+    lam : array_like
+        Cable length over tow radius [-].
+
+    Returns
+    -------
+    ndarray
+        gamma_c1 [-], > 0; nan for lambda <= 1.
+
+    Notes
+    -----
+    gamma_c1 = (lambda^(2/3) - 1)^(-3/4). The cable is then a straight rod that carries a point mass.
 
     Examples
     --------
@@ -108,8 +186,20 @@ def massless_cable(lam: ArrayLike) -> Array:
 
 
 def long_cable(n: ArrayLike) -> Array:
-    """gamma_cn^2 lambda for lambda -> infinity without a fish, z_n = j_{0,n}^2 / 4 with the n-th zero of J0.
+    """gamma_cn^2 lambda for lambda -> infinity without a fish.
 
+    Parameters
+    ----------
+    n : array_like of int
+        Number of the transition, >= 1.
+
+    Returns
+    -------
+    ndarray
+        z_n = j_{0,n}^2 / 4 [-], with the n-th zero of J0.
+
+    Notes
+    -----
     The cable is then a hanging chain at its n-th resonance; the correction is of order lambda^(-2/3).
 
     Examples

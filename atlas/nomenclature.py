@@ -9,7 +9,19 @@ EQUILIBRIA = "equilibria"
 
 @dataclass(frozen=True)
 class Symbol:
-    """A quantity: its name in code and files, in words, in TeX, and its source. All are dimensionless (unit 1)."""
+    """A quantity, dimensionless (unit 1).
+
+    Attributes
+    ----------
+    name : str
+        In code and files.
+    long_name : str
+        In words.
+    tex : str
+        The symbol.
+    source : str
+        Where it is defined.
+    """
 
     name: str
     long_name: str
@@ -92,8 +104,17 @@ _ONE_STATE = (
         "$x$",
         f"{REPORT}, Eq. (32a)",
     ),
+    Symbol(
+        "y",
+        "position along the way of the tow point over tow radius, positive ahead of it",
+        "$y$",
+        f"{REPORT}, Eq. (12)",
+    ),
     Symbol("z", "depth below the tow point over tow radius", "$z$", f"{REPORT}, Eq. (31)"),
     Symbol("R_x", "radial force of the cable over (mu + rho A) g R", "$R_x$", f"{REPORT}, Eq. (32b)"),
+    Symbol(
+        "R_y", "force of the cable along the way of the tow point over (mu + rho A) g R", "$R_y$", f"{REPORT}, Eq. (20)"
+    ),
     Symbol("R_z", "vertical force of the cable over (mu + rho A) g R", "$R_z$", f"{REPORT}, Eq. (28)"),
     Symbol("T", "cable tension over (mu + rho A) g R", "$T$", f"{REPORT}, Eq. (20d)"),
 )

@@ -10,7 +10,7 @@ from benchmarks import coldstart, figures, folds, lookup, report, shots, targets
 from benchmarks.peers_shots import missing
 from benchmarks.samples import ROOT
 from benchmarks.timing import Row
-from towatlas.tables.critical import default_path
+from towatlas.tables.file import default_path
 
 # Rows of the second chart that the README shows: method, start of the setting.
 SHOWN = (

@@ -30,7 +30,7 @@ one, out = np.ones(1), [np.empty(1) for _ in range(3)]
 timed("forward_shots", lambda: forward_shots(one, one, one, one, 10, *out, 0, 1))
 timed("first equilibria of a cable", lambda: towatlas.equilibria(37.8, 1352, gamma=5.94))
 found = np.empty((1, 4)), np.empty(1, np.int64)
-timed("scan_system", lambda: scan_system(1.0, 10.0, 0.3, 0.9, 8, 64, 10, 1, 1e-3, *found))
+timed("scan_system", lambda: scan_system(10.0, 1.0, 0.3, 0.9, 8, 64, 10, 1, 1e-3, *found))
 print(json.dumps(times))
 """
 

@@ -58,7 +58,9 @@ def true_roots(w_f: float, lam: np.ndarray, gamma: np.ndarray) -> list[np.ndarra
     rows = np.repeat(np.arange(len(lam)), 1 + 2 * passed)
     place = np.concatenate([np.arange(1 + 2 * k) for k in passed])
     n, outer = (place + 1) // 2, place % 2 == 1
-    found = solve_members(np.full(len(rows), w_f), lam[rows], gamma[rows], n, outer, shoot_lanes)
+    found = solve_members(
+        lam=lam[rows], w_f=np.full(len(rows), w_f), gamma=gamma[rows], n=n, outer=outer, shoot=shoot_lanes
+    )
     if (found.status != status.OK).any():
         raise ArithmeticError(f"w_f = {w_f:g}: {(found.status != status.OK).sum()} equilibria were not computed")
     return [np.sort(part) for part in np.split(found.R_x0, np.cumsum(1 + 2 * passed)[:-1])]
@@ -68,7 +70,7 @@ def boundary_errors(w_f: float, lam: np.ndarray, gamma: np.ndarray, r_x0: np.nda
     """E of Eq. (33) of forward shots of 100 segments, one a row."""
     rows = len(lam)
     errors, x_end, r_x_end = np.empty(rows), np.empty(rows), np.empty(rows)
-    forward_shots_parallel(np.full(rows, w_f), lam, gamma, r_x0, SEGMENTS, errors, x_end, r_x_end)
+    forward_shots_parallel(lam, np.full(rows, w_f), gamma, r_x0, SEGMENTS, errors, x_end, r_x_end)
     return errors
 
 

@@ -8,10 +8,10 @@ import towatlas
 from benchmarks import peers_folds as peers
 from benchmarks.samples import FoldReference, cables, fold_reference
 from benchmarks.timing import LOST, Row, once, seconds
-from towatlas.kernels.folds import solve_folds
+from towatlas.kernels.folds import Cables, Folds, solve_folds
 from towatlas.kernels.scan import scan_system
 from towatlas.limits import excess_length
-from towatlas.tables.critical import Atlas
+from towatlas.tables.atlas import Atlas
 
 TABLE = 4000
 REFERENCE_METHOD = "direct, table"
@@ -69,11 +69,12 @@ def _one_by_one(exact: FoldReference) -> Row:
     gamma = np.empty(rows)
 
     def solve() -> None:
-        results, error, codes = np.empty((rows, 4)), np.empty(rows), np.empty(rows, np.int64)
-        a, guess, slopes = np.zeros(rows), np.zeros(rows), np.full((rows, 4), np.nan)
+        cables = Cables(exact.lam, exact.w_f, exact.n, excess)
+        guess = np.zeros(rows), np.zeros(rows), np.full((rows, 4), np.nan)
+        folds = Folds(*guess, np.empty((rows, 4)), np.empty(rows), np.empty(rows, np.int64))
         for i in range(rows):
-            solve_folds(exact.n, exact.w_f, exact.lam, excess, a, guess, slopes, results, error, codes, i, i + 1)
-        gamma[:] = results[:, 0]
+            solve_folds(cables, folds, i, i + 1)
+        gamma[:] = folds.states[:, 0]
 
     spent = seconds(solve, 3)
     return Row("direct, one by one", "one cable a call", rows, {"gamma": exact.errors(gamma)}, spent / rows * 1e6)
@@ -82,7 +83,7 @@ def _one_by_one(exact: FoldReference) -> Row:
 def _scanner(segments: int, guesses: int, speeds: int) -> Callable:
     def scan(n: int, w_f: float, lam: float) -> float:
         results, statuses = np.empty((n, 4)), np.empty(n, np.int64)
-        scan_system(w_f, lam, 0.95 / np.sqrt(lam), 60.0, speeds, guesses, segments, n, 1e-9, results, statuses)
+        scan_system(lam, w_f, 0.95 / np.sqrt(lam), 60.0, speeds, guesses, segments, n, 1e-9, results, statuses)
         return float(results[n - 1, 0])
 
     return scan

@@ -10,8 +10,8 @@ import numpy as np
 import towatlas
 from benchmarks.samples import SEED, cables
 from benchmarks.timing import Row, once, seconds
-from towatlas.numerics import chebyshev as interpolant
-from towatlas.tables.critical import Atlas
+from towatlas.numerics import chebyshev
+from towatlas.tables.atlas import Atlas
 
 POINTS = 100_000
 ORDER = 1  # the peers hold one n at a time
@@ -25,16 +25,16 @@ def measure(table: Atlas, points: int = POINTS) -> tuple[list[Row], dict[str, fl
     _, w_f, _ = cables(points)
     lam = towatlas.threshold_length(w_f, ORDER) + 10.0 ** np.random.default_rng(SEED).uniform(-3, 3, points)
     exact = towatlas.solve_critical(lam, w_f, ORDER).gamma
-    axes, series = table.axes, table.series("gamma", ORDER)
-    x, y = interpolant.nodes(series.shape[1]), interpolant.nodes(series.shape[0])
-    values = interpolant.tensor(series[None], x, y)[0]
+    axes, series = table.critical.axes, table.critical.series("gamma", ORDER)
+    x, y = chebyshev.nodes(series.shape[1]), chebyshev.nodes(series.shape[0])
+    values = chebyshev.on_grid(series[None], y, x)[0]
 
     def through(evaluate: Callable) -> Callable:
         """gamma from a peer that holds the smooth field: the same coordinates before and the same law after."""
 
         def speed(lam: np.ndarray, w_f: np.ndarray) -> np.ndarray:
             excess = towatlas.excess_length(lam, w_f, ORDER)
-            return np.exp(evaluate(axes.x(excess), axes.y(w_f))) / np.sqrt(excess)
+            return np.exp(evaluate(axes.excess.coordinate(excess), axes.w_f.coordinate(w_f))) / np.sqrt(excess)
 
         return speed
 

@@ -232,7 +232,7 @@ def order_8(a: Array, mu: Array, tau: Array, segments: int = 0, rtol: float = 0.
 
 
 @numba.njit(parallel=True)
-def scalar_forward_shots(w_f, lam, gamma, r_x0, segments, errors):
+def scalar_forward_shots(lam, w_f, gamma, r_x0, segments, errors):
     """Skop's forward shots, one after the other in a parallel loop: what `forward_shots` is measured by."""
     for i in numba.prange(len(w_f)):
         x, force = 1.0, r_x0[i]

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from towatlas.report import page as report
-from towatlas.scene.answers import SceneAnswer, answer_scene
+from towatlas.scene.choice import Choice, choose, compare
 from towatlas.scene.file import read_scene
-from towatlas.scene.models import QUESTIONS, Choice, choose, compare
+from towatlas.scene.jumps import SceneAnswer, answer_scene
+from towatlas.scene.models import QUESTIONS
 from towatlas.scene.scene import MODELS
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -89,7 +90,7 @@ def measure(photographs: Sequence[tuple[str, float, int]] = PHOTOGRAPHS) -> list
         whole = {model: _timed(answer_scene, scene=scene, model=model) for model in MODELS}
         answers = [whole[model][1].choice.answer for model in MODELS]
         # The last of the pairs that a scene solves is listed, not compared.
-        choice = choose(scene, answers, QUESTIONS, answers[0].folds.n[:-1].tolist())
+        choice = choose(scene, answers, QUESTIONS, answers[0].speeds.n[:-1].tolist())
         seconds = [{model: spent for model, (spent, _) in times.items()} for times in (shape, whole)]
         found.append(Photograph(name, gamma, nodes, choice, *seconds))
     return found

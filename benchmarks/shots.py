@@ -96,7 +96,7 @@ def _forward(exact: ShotReference, segments: int) -> Row:
     errors, x, force = np.empty(rows), np.empty(rows), np.empty(rows)
 
     def shoot() -> None:
-        cable = exact.mu / size, exact.tau / size, np.sqrt(size), np.sign(p) * f / size
+        cable = exact.tau / size, exact.mu / size, np.sqrt(size), np.sign(p) * f / size
         forward_shots(*cable, segments, errors, x, force, 0, rows)
 
     spent = seconds(shoot) if segments <= 1000 else once(shoot)

@@ -73,9 +73,9 @@ def of_forward_shots(rows: int = 4096, segments: int = 100) -> list[Target]:
     threads = numba.get_num_threads()
     numba.set_num_threads(1)
     try:
-        ours = seconds(lambda: forward_shots(w_f, lam, gamma, r_x0, segments, *out, 0, rows), 15)
+        ours = seconds(lambda: forward_shots(lam, w_f, gamma, r_x0, segments, *out, 0, rows), 15)
         bound = seconds(lambda: methods.roots_and_divisions(lam, 4 * segments, out[1]), 15)
-        scalar = seconds(lambda: methods.scalar_forward_shots(w_f, lam, gamma, r_x0, segments, out[0]))
+        scalar = seconds(lambda: methods.scalar_forward_shots(lam, w_f, gamma, r_x0, segments, out[0]))
     finally:
         numba.set_num_threads(threads)
     each = f"{ours / rows / segments / 4 * 1e9:.2f} ns a right-hand side"
@@ -96,12 +96,12 @@ def of_threads(rows: int = 20_000) -> list[Target]:
     ones, out = np.ones(rows), [np.empty(rows) for _ in range(3)]
     n, lam, w_f = np.full(rows, 2), np.geomspace(8.0, 800.0, rows), np.full(rows, 10.0)
     excess = excess_length(lam, w_f, n)
-    guess = seed(n, w_f, lam, excess, solve_rows)
+    guess = seed(n=n, w_f=w_f, lam=lam, excess=excess, solve=solve_rows)
     folded = np.empty((rows, 4)), np.empty(rows), codes[0]
     calls = {
         "fish-up shots": lambda: march_parallel(a, mu, tau, *orders, 10**7, ends, folds, *codes),
-        "forward shots": lambda: forward_shots_parallel(ones, lam, ones, -lam, 100, *out),
-        "folds": lambda: solve_folds_parallel(n, w_f, lam, excess, *(column.copy() for column in guess), *folded),
+        "forward shots": lambda: forward_shots_parallel(lam, ones, ones, -lam, 100, *out),
+        "folds": lambda: solve_folds_parallel(lam, w_f, n, excess, *(column.copy() for column in guess), *folded),
         "folds with their seeds": lambda: towatlas.solve_critical(lam, w_f, n),
     }
     found, before = [], numba.get_num_threads()

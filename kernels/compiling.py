@@ -144,7 +144,7 @@ class _Listener(event.Listener):
         function = event.data["dispatcher"].py_func
         # numba compiles under a lock of its own: one thread at a time counts here.
         self.depth += 1
-        if self.depth == 1 and function.__module__.startswith(__name__.rpartition(".")[0]):
+        if self.depth == 1 and (function.__module__ or "").startswith(__name__.rpartition(".")[0]):
             notice.compiling(function.__name__)
 
     def on_end(self, event: event.Event) -> None:

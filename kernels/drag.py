@@ -20,12 +20,14 @@ the cable meets the axis, where the steps shrink to the distance from it.
 """
 
 from math import log, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from towatlas.kernels import status
 from towatlas.kernels.compiling import helper, kernel
 from towatlas.kernels.series import FIRST, ORDER, PRODUCT, RATE, RATIO, ROOT, T, U, clear, march_of, reach, run, value
+from towatlas.kernels.system import C_F, C_T, LAM, M_F, W_F, C, W
 
 X, Y, H, FX, FY, FZ = range(FIRST, FIRST + 6)
 STATE = 8  # quantities up to here are marched, the rest are intermediate
@@ -36,8 +38,6 @@ R, SPEED2, KAPPA, KAPPA_T, WEIGHT, ONE = range(STATE + 13, STATE + 19)
 # Room for the start: root(1 + 4 e^2), sine and cosine, the tangent, the load over T'.
 SLANT, SINE, COSINE, TX, TY, TZ, UPRIGHT = range(STATE + 19, STATE + 26)
 QUANTITIES = STATE + 26
-# Columns of a system.
-LAM, W_F, M_F, DRAG, DRAG_F, W, DRAG_T = range(7)
 # Rows of the result: the state, and log(rho / gamma^2), zero at an equilibrium.
 RESULT_ROWS = STATE - FIRST + 2
 TENSION_ROW, LOG_RHO_ROW = STATE - FIRST, STATE - FIRST + 1
@@ -210,8 +210,8 @@ def _set_parameters(c, r, gamma2, system, places):
     c[WEIGHT, 0, 0] = system[W]
     c[R, 0, 0] = r
     c[SPEED2, 0, 0] = gamma2
-    c[KAPPA, 0, 0] = system[DRAG] / gamma2
-    c[KAPPA_T, 0, 0] = system[DRAG_T] / gamma2
+    c[KAPPA, 0, 0] = system[C] / gamma2
+    c[KAPPA_T, 0, 0] = system[C_T] / gamma2
     factor = r
     for power in range(1, 4):
         factor /= power
@@ -228,7 +228,7 @@ def _set_parameters(c, r, gamma2, system, places):
 @helper
 def _start(c, system, jets):
     """State at the fish, or just above a bare tip; returns the cable paid out."""
-    bare = system[W_F] == 0.0 and system[M_F] == 0.0 and system[DRAG_F] == 0.0
+    bare = system[W_F] == 0.0 and system[M_F] == 0.0 and system[C_F] == 0.0
     run(c, TIP if bare else FISH, 0, jets, ALL)
     u = TIP_REACH * c[T2, 0, 0] / (1.0 + c[KAPPA, 0, 0] * c[R, 0, 0]) if bare else 0.0
     for n in range(c.shape[1]):
@@ -236,7 +236,7 @@ def _start(c, system, jets):
         c[Y, n, 0] = -u * c[TY, n, 0]
         c[H, n, 0] = u * c[TZ, n, 0]
         c[FX, n, 0] = u * c[FX, n, 0] if bare else system[M_F] * c[TX, n, 0]
-        c[FY, n, 0] = u * c[FY, n, 0] if bare else system[DRAG_F] * c[TY, n, 0]
+        c[FY, n, 0] = u * c[FY, n, 0] if bare else system[C_F] * c[TY, n, 0]
         c[FZ, n, 0] = u * c[FZ, n, 0] if bare else system[W_F] * c[SPEED2, n, 0]
     if not bare:
         for n in range(c.shape[1]):
@@ -265,17 +265,48 @@ def _finish(c, jets, result):
     result[LOG_RHO_ROW, 0] = 0.5 * log(leading) - log(c[SPEED2, 0, 0])
 
 
+class Shots(NamedTuple):
+    """Shots to make, a row each: radius r of the fish and speed gamma^2, lengths over g / Omega^2.
+
+    systems : shape (rows, len(COLUMNS)), as kernels.system names them. shares : the part of the cable to shoot over.
+    """
+
+    r: Any
+    gamma2: Any
+    systems: Any
+    shares: Any
+
+
+class Algebra(NamedTuple):
+    """A kind of jet: products and places as in `towatlas.solve.jets`, and the degree."""
+
+    products: Any
+    places: Any
+    degree: Any
+
+
+class Reached(NamedTuple):
+    """What the shots came to: state : shape (rows, RESULT_ROWS, monomials), X, Y, h, F_x, F_y, F_z, T and
+    log(rho / gamma^2) at the end; steps made; statuses.
+    """
+
+    state: Any
+    steps: Any
+    statuses: Any
+
+
 @helper
-def _shoot(c, new, r, gamma2, system, share, jets, places, degree, max_steps, trace, result):
+def _shoot(c, new, shots, i, algebra, max_steps, trace, result):
     """One shot over a share of the cable; returns steps and a status."""
-    _set_parameters(c, r, gamma2, system, places)
+    system, jets = shots.systems[i], algebra.products
+    _set_parameters(c, shots.r[i], shots.gamma2[i], system, algebra.places)
     paid = _start(c, system, jets)
     end = np.empty(c.shape[1])
     for n in range(len(end)):
-        end[n] = system[LAM] * share * c[SPEED2, n, 0]
+        end[n] = system[LAM] * shots.shares[i] * c[SPEED2, n, 0]
     outcome, steps = status.OK, 0
     if paid < end[0]:
-        _, steps, outcome = _march(c, new, system[W], jets, degree, paid, 0.0, end, max_steps, trace)
+        _, steps, outcome = _march(c, new, system[W], jets, algebra.degree, paid, 0.0, end, max_steps, trace)
     _finish(c, jets, result)
     if not np.isfinite(result[LOG_RHO_ROW, 0]) and outcome == status.OK:
         outcome = status.BAD_INPUT
@@ -283,20 +314,12 @@ def _shoot(c, new, r, gamma2, system, share, jets, places, degree, max_steps, tr
 
 
 @kernel
-def shoot_drag(
-    r, gamma2, systems, shares, jets, places, degree, max_steps, trace, results, steps, statuses, begin, stop
-):
-    """Shots begin..stop-1: fish at radius r[i], speed squared gamma2[i], cable systems[i]; lengths over g / Omega^2.
+def shoot_drag(shots, algebra, max_steps, trace, reached, begin, stop):
+    """Shots begin..stop-1 of those given; results go to the same rows of `reached`.
 
-    systems : shape (rows, 7), columns lambda, w_f, m_f, C, C_f, w, C_t. shares : the part of the cable to shoot over.
-    jets, places, degree : of `towatlas.solve.jets`. trace : u, X, Y, h, F after each step of the last shot, as many as
-    there is room for. results : shape (rows, RESULT_ROWS, monomials), X, Y, h, F_x, F_y, F_z, T, log(rho / gamma^2) at
-    the end.
+    trace : u, X, Y, h, F after each step of the last shot, as many as there is room for.
     """
-    monomials = results.shape[2]
-    c = np.zeros((QUANTITIES, monomials, ORDER + 1))
-    new = np.zeros((STATE, monomials))
+    c = np.zeros((QUANTITIES, reached.state.shape[2], ORDER + 1))
+    new = np.zeros((STATE, reached.state.shape[2]))
     for i in range(begin, stop):
-        steps[i], statuses[i] = _shoot(
-            c, new, r[i], gamma2[i], systems[i], shares[i], jets, places, degree, max_steps, trace, results[i]
-        )
+        reached.steps[i], reached.statuses[i] = _shoot(c, new, shots, i, algebra, max_steps, trace, reached.state[i])

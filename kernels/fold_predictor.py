@@ -9,7 +9,7 @@ SLOPES = 4  # of log a in log(excess) and log w_f, then of log gamma
 
 
 @kernel
-def seed_folds(series, excess, w_f, span, w_scale, a, gamma, slopes, begin, stop):
+def seed_folds(series, w_f, excess, span, w_scale, a, gamma, slopes, begin, stop):
     """Guess a, gamma and their slopes for rows begin..stop-1, all of one n.
 
     series[0], series[1] : Chebyshev coefficients (y degree, x degree) of log(a excess) and log(gamma sqrt(excess)) in

@@ -1,6 +1,7 @@
 """From shots to critical states: the direct solution of one fold, and its closed-form first guess."""
 
 from math import exp, log, pi, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -110,135 +111,197 @@ def _newton_step(jac, residual0, residual1):
     )
 
 
-@kernel
-def solve_folds(n, w_f, lam, excess, a, gamma, slopes, results, error, statuses, begin, stop):
-    """Critical state n[i] of the cable (lam[i], w_f[i]), for rows begin..stop-1.
+class Cables(NamedTuple):
+    """Cables whose n-th fold is asked for, arrays of shape (rows,); excess : lambda - lambda_cn."""
 
-    a, gamma : guess in, solution out; a row with gamma[i] <= 0 gets a guess. excess : lambda - lambda_cn.
-    slopes[i] : of log a in log(excess) and in log w_f, then of log gamma, near the solution; nan where not known.
-    results[i] : gamma, R_x0, x_f, z_f, lengths over the tow radius. error[i] : relative error estimate of gamma.
+    lam: Any
+    w_f: Any
+    n: Any
+    excess: Any
+
+
+class Folds(NamedTuple):
+    """Guesses in, solutions out, arrays of shape (rows,) but for slopes and states.
+
+    a, gamma : a row with gamma <= 0 is given a guess. slopes : shape (rows, 4), of log a in log(excess) and in log w_f,
+    then of log gamma, near the solution; nan where not known. states : shape (rows, 4), gamma, R_x0, x_f, z_f, lengths
+    over the tow radius. error : relative error estimate of gamma. statuses : codes.
+    """
+
+    a: Any
+    gamma: Any
+    slopes: Any
+    states: Any
+    error: Any
+    statuses: Any
+
+
+# What is kept of a row from round to round: unknowns log a and log gamma, the last step and its size, the residuals
+# before it, the rounding of log gamma, and the step of differences.
+X, STEP, BEFORE = (0, 1), (2, 3), (4, 5)
+SIZE, ROUNDING, DIFFERENCE_STEP = 6, 7, 8
+WORK_COLUMNS = 9
+# Whole numbers: whether the row is still open, whether its Jacobian is taken anew or comes from the slopes given, how
+# often it went back, and which shot of the round is its first.
+OPEN, FRESH, SEEDED, RETREATS_MADE, FIRST = range(5)
+BOOK_COLUMNS = 5
+
+
+@helper
+def _begin(lam, w_f, n, excess, a, gamma, slopes, work, book, k):
+    """Where a row starts; returns its status, NOT_CONVERGED if it can be solved."""
+    book[k, OPEN], book[k, SEEDED], book[k, RETREATS_MADE], book[k, FIRST] = 0, 0, 0, 0
+    book[k, FRESH] = 1
+    work[k, SIZE] = np.inf
+    if not (np.isfinite(lam) and np.isfinite(w_f) and n >= 1 and w_f >= 0.0):
+        return status.BAD_INPUT
+    if not excess > 0.0:
+        return status.NO_TRANSITION
+    if ROUNDINGS * EPS * (1.0 + lam / excess) > WORTHLESS:
+        return status.LOST_IN_ROUNDING
+    book[k, OPEN] = 1
+    work[k, ROUNDING] = EPS * (1.0 + lam / excess)
+    work[k, DIFFERENCE_STEP] = DIFFERENCE + sqrt(work[k, ROUNDING])
+    if gamma > 0.0:
+        work[k, X[0]], work[k, X[1]] = log(a), log(gamma)
+        determinant = _slopes_determinant(slopes)
+        if np.isfinite(determinant) and determinant != 0.0:
+            book[k, SEEDED], book[k, FRESH] = 1, 0
+    else:
+        work[k, X[0]], work[k, X[1]] = _first_guess(lam, w_f, excess, n)
+    return status.NOT_CONVERGED
+
+
+@helper
+def _place_shots(w_f, n, work, book, k, count, job_a, job_mu, job_n):
+    """The shots of a row in this round: one, or three where the Jacobian is taken anew; returns how many there are."""
+    book[k, FIRST] = count
+    for variant in range(3 if book[k, FRESH] else 1):
+        job_a[count] = exp(work[k, X[0]] + (work[k, DIFFERENCE_STEP] if variant == 1 else 0.0))
+        job_mu[count] = w_f * exp(2.0 * (work[k, X[1]] + (work[k, DIFFERENCE_STEP] if variant == 2 else 0.0)))
+        job_n[count] = n
+        count += 1
+    return count
+
+
+@helper
+def _step_back(lam, w_f, n, excess, outcome, work, book, k):
+    """After a shot that failed: begin again without the seed, or go half of the step back, or give up; the status."""
+    if book[k, SEEDED]:
+        book[k, SEEDED], book[k, FRESH] = 0, 1
+        work[k, X[0]], work[k, X[1]] = _first_guess(lam, w_f, excess, n)
+    elif book[k, RETREATS_MADE] == RETREATS or not work[k, SIZE] < np.inf:
+        # Nothing to go back on a first guess, or after many halvings. The input was sound: a shot that overflowed says
+        # that the solver lost its way.
+        book[k, OPEN] = 0
+        return status.STEP_LIMIT if outcome == status.STEP_LIMIT else status.NOT_CONVERGED
+    else:
+        book[k, RETREATS_MADE] += 1
+        book[k, FRESH] = 1
+        for column in range(2):
+            work[k, STEP[column]] *= 0.5
+            work[k, X[column]] -= work[k, STEP[column]]
+    return status.NOT_CONVERGED
+
+
+@helper
+def _update_jacobian(n, excess, slopes, job_mu, shot_folds, miss0, miss1, jac, work, book, k):
+    """The Jacobian by differences, from the slopes given, or by Broyden's update."""
+    if book[k, FRESH]:
+        for column in range(2):
+            j = book[k, FIRST] + 1 + column
+            log_gamma = work[k, X[1]] + (work[k, DIFFERENCE_STEP] if column == 1 else 0.0)
+            near0, near1 = _residual(shot_folds[j, 0], job_mu[j], log_gamma, excess, n)
+            jac[0, column] = (near0 - miss0) / work[k, DIFFERENCE_STEP]
+            jac[1, column] = (near1 - miss1) / work[k, DIFFERENCE_STEP]
+    elif book[k, SEEDED]:
+        _jacobian_from_slopes(slopes, jac)
+        book[k, SEEDED] = 0
+    else:
+        _broyden(jac, work[k, STEP[0] : STEP[1] + 1], miss0, miss1, work[k, BEFORE[0] : BEFORE[1] + 1])
+
+
+@helper
+def _next_step(jac, miss0, miss1, work, book, k):
+    """Newton's step from here, made unless it is the last; returns whether it is."""
+    step0, step1 = _newton_step(jac, miss0, miss1)
+    size = max(abs(step0), abs(step1))
+    noise = NOISE + 100.0 * work[k, ROUNDING]
+    last = size <= 8.0 * work[k, ROUNDING] or (size < noise and not book[k, FRESH] and size > 0.5 * work[k, SIZE])
+    work[k, STEP[0]], work[k, STEP[1]] = step0, step1
+    if not last:
+        near = size < NEAR and (book[k, FRESH] or size < 0.5 * work[k, SIZE])
+        book[k, FRESH] = 0 if near else 1
+        work[k, SIZE] = size
+        limit = min(1.0, 1.0 / size)
+        work[k, BEFORE[0]], work[k, BEFORE[1]] = miss0, miss1
+        for column in range(2):
+            work[k, STEP[column]] *= limit
+            work[k, X[column]] += work[k, STEP[column]]
+    return last
+
+
+@helper
+def _settle(n, job_a, job_mu, fold, state):
+    """The critical state read off a shot; returns gamma and what the rounding of the shot makes of it."""
+    p = abs(fold[2])
+    sign = 1.0 if n % 2 == 0 else -1.0
+    state[0] = sqrt(p)
+    state[1] = sign * fold[1] / p
+    state[2] = sign * job_a / p
+    state[3] = fold[3] / p
+    return state[0], WAVES * EPS * _amplitude(fold, job_mu) / p
+
+
+@kernel
+def solve_folds(cables, folds, begin, stop):
+    """Critical states of the cables given, for rows begin..stop-1.
 
     Unknowns log a and log gamma, so that both limits of every power law are straight lines; Newton with differences
     while far, Broyden when near. All rows not yet done make their shots together, round after round.
     """
+    # Arrays one by one from here on: a tuple of them costs a microsecond a row to hand around.
+    lam, w_f, n, excess = cables.lam, cables.w_f, cables.n, cables.excess
+    a, gamma, slopes, states, error, statuses = (
+        folds.a,
+        folds.gamma,
+        folds.slopes,
+        folds.states,
+        folds.error,
+        folds.statuses,
+    )
     rows = stop - begin
-    job_a = np.empty(3 * rows)
-    job_mu = np.empty(3 * rows)
-    job_end = np.full(3 * rows, np.inf)
+    work, book, jac = np.zeros((rows, WORK_COLUMNS)), np.empty((rows, BOOK_COLUMNS), np.int64), np.empty((rows, 2, 2))
+    job_a, job_mu, job_end = np.empty(3 * rows), np.empty(3 * rows), np.full(3 * rows, np.inf)
     job_n = np.empty(3 * rows, np.int64)
-    ends = np.empty((3 * rows, END_COLUMNS))
-    folds = np.empty((3 * rows, 1, FOLD_COLUMNS))
-    counts = np.empty(3 * rows, np.int64)
-    outcomes = np.empty(3 * rows, np.int64)
-    first = np.zeros(rows, np.int64)
-    x = np.empty((rows, 2))
-    before = np.empty((rows, 2))
-    step = np.zeros((rows, 2))
-    size = np.full(rows, np.inf)
-    jac = np.empty((rows, 2, 2))
-    fresh = np.ones(rows, np.bool_)
-    seeded = np.zeros(rows, np.bool_)
-    active = np.zeros(rows, np.bool_)
-    retreats = np.zeros(rows, np.int64)
-    rounding = np.zeros(rows)
-    difference = np.zeros(rows)
-
+    ends, shot_folds = np.empty((3 * rows, END_COLUMNS)), np.empty((3 * rows, 1, FOLD_COLUMNS))
+    counts, outcomes = np.empty(3 * rows, np.int64), np.empty(3 * rows, np.int64)
     for k in range(rows):
         i = begin + k
-        results[i, :] = np.nan
+        states[i, :] = np.nan
         error[i] = np.nan
-        if not (np.isfinite(lam[i]) and np.isfinite(w_f[i]) and n[i] >= 1 and w_f[i] >= 0.0):
-            statuses[i] = status.BAD_INPUT
-        elif not excess[i] > 0.0:
-            statuses[i] = status.NO_TRANSITION
-        elif ROUNDINGS * EPS * (1.0 + lam[i] / excess[i]) > WORTHLESS:
-            statuses[i] = status.LOST_IN_ROUNDING
-        else:
-            statuses[i] = status.NOT_CONVERGED
-            active[k] = True
-            rounding[k] = EPS * (1.0 + lam[i] / excess[i])
-            difference[k] = DIFFERENCE + sqrt(rounding[k])
-            if gamma[i] > 0.0:
-                x[k, 0], x[k, 1] = log(a[i]), log(gamma[i])
-                determinant = _slopes_determinant(slopes[i])
-                seeded[k] = np.isfinite(determinant) and determinant != 0.0
-                fresh[k] = not seeded[k]
-            else:
-                x[k, 0], x[k, 1] = _first_guess(lam[i], w_f[i], excess[i], n[i])
-
+        statuses[i] = _begin(lam[i], w_f[i], n[i], excess[i], a[i], gamma[i], slopes[i], work, book, k)
     for _ in range(ROUNDS):
         jobs = 0
         for k in range(rows):
-            if active[k]:
-                first[k] = jobs
-                for variant in range(3 if fresh[k] else 1):
-                    job_a[jobs] = exp(x[k, 0] + (difference[k] if variant == 1 else 0.0))
-                    job_mu[jobs] = w_f[begin + k] * exp(2.0 * (x[k, 1] + (difference[k] if variant == 2 else 0.0)))
-                    job_n[jobs] = n[begin + k]
-                    jobs += 1
+            if book[k, OPEN]:
+                jobs = _place_shots(w_f[begin + k], n[begin + k], work, book, k, jobs, job_a, job_mu, job_n)
         if jobs == 0:
             break
-        march(job_a, job_mu, job_end, job_n, job_n, MAX_STEPS, ends, folds, counts, outcomes, 0, jobs)
+        march(job_a, job_mu, job_end, job_n, job_n, MAX_STEPS, ends, shot_folds, counts, outcomes, 0, jobs)
         for k in range(rows):
-            if not active[k]:
+            if not book[k, OPEN]:
                 continue
-            i = begin + k
-            j = first[k]
-            if outcomes[j] != status.OK and seeded[k]:
-                # A seed too far off: begin again without it.
-                seeded[k], fresh[k] = False, True
-                x[k, 0], x[k, 1] = _first_guess(lam[i], w_f[i], excess[i], n[i])
-                continue
+            i, j = begin + k, book[k, FIRST]
             if outcomes[j] != status.OK:
-                # A step too far: go back half of it. Nothing to go back on a first guess, or after many halvings.
-                if retreats[k] == RETREATS or not size[k] < np.inf:
-                    # The input was sound: a shot that overflowed says that the solver lost its way.
-                    statuses[i] = status.STEP_LIMIT if outcomes[j] == status.STEP_LIMIT else status.NOT_CONVERGED
-                    active[k] = False
-                    continue
-                retreats[k] += 1
-                fresh[k] = True
-                for column in range(2):
-                    step[k, column] *= 0.5
-                    x[k, column] -= step[k, column]
+                statuses[i] = _step_back(lam[i], w_f[i], n[i], excess[i], outcomes[j], work, book, k)
                 continue
-            retreats[k] = 0
-            fold = folds[j, 0]
-            miss0, miss1 = _residual(fold, job_mu[j], x[k, 1], excess[i], n[i])
-            if fresh[k]:
-                for column in range(2):
-                    log_gamma = x[k, 1] + (difference[k] if column == 1 else 0.0)
-                    near0, near1 = _residual(
-                        folds[j + 1 + column, 0], job_mu[j + 1 + column], log_gamma, excess[i], n[i]
-                    )
-                    jac[k, 0, column] = (near0 - miss0) / difference[k]
-                    jac[k, 1, column] = (near1 - miss1) / difference[k]
-            elif seeded[k]:
-                _jacobian_from_slopes(slopes[i], jac[k])
-                seeded[k] = False
-            else:
-                _broyden(jac[k], step[k], miss0, miss1, before[k])
-            step[k, 0], step[k, 1] = _newton_step(jac[k], miss0, miss1)
-            new_size = max(abs(step[k, 0]), abs(step[k, 1]))
-            if new_size <= 8.0 * rounding[k] or (
-                new_size < NOISE + 100.0 * rounding[k] and not fresh[k] and new_size > 0.5 * size[k]
-            ):
-                p = abs(fold[2])
-                sign = 1.0 if n[i] % 2 == 0 else -1.0
+            book[k, RETREATS_MADE] = 0
+            miss0, miss1 = _residual(shot_folds[j, 0], job_mu[j], work[k, X[1]], excess[i], n[i])
+            _update_jacobian(n[i], excess[i], slopes[i], job_mu, shot_folds, miss0, miss1, jac[k], work, book, k)
+            if _next_step(jac[k], miss0, miss1, work, book, k):
                 a[i] = job_a[j]
-                gamma[i] = sqrt(p)
-                results[i, 0] = gamma[i]
-                results[i, 1] = sign * fold[1] / p
-                results[i, 2] = sign * job_a[j] / p
-                results[i, 3] = fold[3] / p
-                error[i] = abs(step[k, 1]) + max(ROUNDINGS * rounding[k], WAVES * EPS * _amplitude(fold, job_mu[j]) / p)
+                gamma[i], rounding = _settle(n[i], job_a[j], job_mu[j], shot_folds[j, 0], states[i])
+                error[i] = abs(work[k, STEP[1]]) + max(ROUNDINGS * work[k, ROUNDING], rounding)
                 statuses[i] = status.OK
-                active[k] = False
-                continue
-            fresh[k] = not (new_size < NEAR and (fresh[k] or new_size < 0.5 * size[k]))
-            size[k] = new_size
-            limit = min(1.0, 1.0 / new_size)
-            before[k, 0], before[k, 1] = miss0, miss1
-            for column in range(2):
-                step[k, column] *= limit
-                x[k, column] += step[k, column]
+                book[k, OPEN] = 0

@@ -21,7 +21,7 @@ TRUSTED = 1e-3
 
 
 @kernel
-def forward_shots(w_f, lam, gamma, r_x0, segments, errors, x_end, r_x_end, begin, stop):
+def forward_shots(lam, w_f, gamma, r_x0, segments, errors, x_end, r_x_end, begin, stop):
     """Forward Runge-Kutta shots begin..stop-1 from the tow point; arrays of one entry a shot.
 
     errors[i] : E(lambda) of Eq. (33). x_end[i], r_x_end[i] : x and R_x at the fish.
@@ -53,13 +53,13 @@ def forward_shots(w_f, lam, gamma, r_x0, segments, errors, x_end, r_x_end, begin
 
 
 @inlined
-def reaction_bounds(w_f, lam):
+def reaction_bounds(lam, w_f):
     """Lower and upper bound of R_x0 / gamma^2, Eq. (35)."""
     return -(0.5 * lam * lam + lam * (w_f - 1.0) - w_f), 0.5 * lam * lam + lam * (w_f + 1.0) + w_f
 
 
 @helper
-def solution_curve(w_f, lam, gamma, low, high, segments, errors):
+def solution_curve(lam, w_f, gamma, low, high, segments, errors):
     """E / gamma^2 at len(errors) values of u = R_x0 / gamma^2 spaced evenly from low to high, both included."""
     guesses = len(errors)
     gamma2 = gamma * gamma
@@ -91,7 +91,7 @@ def _sign_changes(errors, places):
 
 
 @helper
-def _extremum(w_f, lam, gamma, n, middle, half_width, segments, errors):
+def _extremum(lam, w_f, gamma, n, middle, half_width, segments, errors):
     """Largest (-1)^(n-1) E / gamma^2 near u = middle, the u where it is reached, and the final spacing in u."""
     sign = 1.0 if n % 2 == 1 else -1.0
     half = half_width
@@ -99,7 +99,7 @@ def _extremum(w_f, lam, gamma, n, middle, half_width, segments, errors):
     best = -np.inf
     for zoom in range(ZOOMS):
         for _ in range(30):
-            solution_curve(w_f, lam, gamma, middle - half, middle + half, segments, errors)
+            solution_curve(lam, w_f, gamma, middle - half, middle + half, segments, errors)
             top = 0
             for k in range(1, len(errors)):
                 if sign * errors[k] > sign * errors[top]:
@@ -114,20 +114,20 @@ def _extremum(w_f, lam, gamma, n, middle, half_width, segments, errors):
 
 
 @helper
-def _tangency(w_f, lam, n, gamma_low, gamma_high, middle, half_width, segments, tolerance, errors):
+def _tangency(lam, w_f, n, gamma_low, gamma_high, middle, half_width, segments, tolerance, errors):
     """Speed at which the n-th pair of roots of E appears, between gamma_low (no pair) and gamma_high (pair).
 
     Returns gamma, u, width of the final bracket in gamma, spacing in u; nan where there is no such pair. gamma_low is
     lowered where the pair is there already, closer than the scan could see.
     """
-    high, u_high, spacing = _extremum(w_f, lam, gamma_high, n, middle, half_width, segments, errors)
-    low, u_low, spacing = _extremum(w_f, lam, gamma_low, n, middle, half_width, segments, errors)
+    high, u_high, spacing = _extremum(lam, w_f, gamma_high, n, middle, half_width, segments, errors)
+    low, u_low, spacing = _extremum(lam, w_f, gamma_low, n, middle, half_width, segments, errors)
     for _ in range(60):
         if low <= 0.0:
             break
         gamma_high, high, u_high = gamma_low, low, u_low
         gamma_low *= 0.98
-        low, u_low, spacing = _extremum(w_f, lam, gamma_low, n, u_high, half_width, segments, errors)
+        low, u_low, spacing = _extremum(lam, w_f, gamma_low, n, u_high, half_width, segments, errors)
     if not (low <= 0.0 < high):
         return np.nan, np.nan, np.nan, np.nan
     for k in range(SECANTS):
@@ -137,7 +137,7 @@ def _tangency(w_f, lam, n, gamma_low, gamma_high, middle, half_width, segments, 
         trial = gamma_high - share * (gamma_high - gamma_low)
         margin = 0.3 * tolerance * gamma_high
         trial = min(max(trial, gamma_low + margin), gamma_high - margin)
-        best, u, spacing = _extremum(w_f, lam, trial, n, u_high, half_width, segments, errors)
+        best, u, spacing = _extremum(lam, w_f, trial, n, u_high, half_width, segments, errors)
         if best > 0.0:
             gamma_high, high, u_high = trial, best, u
         else:
@@ -157,19 +157,19 @@ def _truncation(coarser, coarse, fine):
 
 
 @helper
-def _count_pairs(w_f, lam, gamma, low, high, segments, errors, places):
-    solution_curve(w_f, lam, gamma, low, high, segments, errors)
+def _count_pairs(lam, w_f, gamma, low, high, segments, errors, places):
+    solution_curve(lam, w_f, gamma, low, high, segments, errors)
     return (_sign_changes(errors, places) - 1) // 2
 
 
 @helper
-def _narrow(w_f, lam, n, below, above, low, high, segments, errors, places):
+def _narrow(lam, w_f, n, below, above, low, high, segments, errors, places):
     """Bisect the speeds until the n-th pair alone has appeared at the upper one and both are close together."""
     for _ in range(30):
-        if _count_pairs(w_f, lam, above, low, high, segments, errors, places) == n and above < 1.001 * below:
+        if _count_pairs(lam, w_f, above, low, high, segments, errors, places) == n and above < 1.001 * below:
             break
         trial = sqrt(below * above)
-        if _count_pairs(w_f, lam, trial, low, high, segments, errors, places) >= n:
+        if _count_pairs(lam, w_f, trial, low, high, segments, errors, places) >= n:
             above = trial
         else:
             below = trial
@@ -177,9 +177,9 @@ def _narrow(w_f, lam, n, below, above, low, high, segments, errors, places):
 
 
 @helper
-def _window(w_f, lam, n, gamma, low, high, segments, errors, places):
+def _window(lam, w_f, gamma, n, low, high, segments, errors, places):
     """Middle and half width in u of a window that holds the n-th pair of roots and no other root."""
-    _count_pairs(w_f, lam, gamma, low, high, segments, errors, places)
+    _count_pairs(lam, w_f, gamma, low, high, segments, errors, places)
     spacing = (high - low) / (len(errors) - 1)
     left = places[n - 1] - 2 if n == 1 else max(places[n - 2], places[n - 1] - 2)
     right = min(places[n + 1], places[n] + 2) + 1
@@ -189,7 +189,7 @@ def _window(w_f, lam, n, gamma, low, high, segments, errors, places):
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     for _ in range(ZOOMS):
         # Between the pair (-1)^(n-1) E is positive; a run of that sign that touches an end belongs to a neighbour.
-        solution_curve(w_f, lam, gamma, low, high, segments, errors)
+        solution_curve(lam, w_f, gamma, low, high, segments, errors)
         spacing = (high - low) / (len(errors) - 1)
         changes = _sign_changes(errors, places)
         first = 0 if (errors[0] > 0.0) != sign else 1
@@ -208,7 +208,7 @@ def _window(w_f, lam, n, gamma, low, high, segments, errors, places):
 
 
 @kernel
-def scan_system(w_f, lam, gamma_low, gamma_high, speeds, guesses, segments, n_max, tolerance, results, statuses):
+def scan_system(lam, w_f, gamma_low, gamma_high, speeds, guesses, segments, n_max, tolerance, results, statuses):
     """Critical states 1..n_max of one cable by scanning speeds from gamma_low to gamma_high.
 
     results[n-1] : gamma, R_x0, resolution of gamma, resolution of R_x0. Both resolutions are absolute and hold the
@@ -219,7 +219,7 @@ def scan_system(w_f, lam, gamma_low, gamma_high, speeds, guesses, segments, n_ma
         statuses[n] = status.NOT_FOUND
         for column in range(4):
             results[n, column] = np.nan
-    low, high = reaction_bounds(w_f, lam)
+    low, high = reaction_bounds(lam, w_f)
     errors = np.empty(guesses)
     zoom = np.empty(ZOOM_GUESSES)
     places = np.zeros(2 * n_max + 2, np.int64)
@@ -229,17 +229,17 @@ def scan_system(w_f, lam, gamma_low, gamma_high, speeds, guesses, segments, n_ma
     ratio = (gamma_high / gamma_low) ** (1.0 / (speeds - 1))
     for k in range(speeds):
         gamma = gamma_low * ratio**k
-        pairs = _count_pairs(w_f, lam, gamma, low, high, segments, errors, places)
+        pairs = _count_pairs(lam, w_f, gamma, low, high, segments, errors, places)
         while found < min(pairs, n_max):
             n = found + 1
-            below, above = _narrow(w_f, lam, n, gamma_before, gamma, low, high, segments, errors, places)
-            middle, half = _window(w_f, lam, n, above, low, high, segments, errors, places)
+            below, above = _narrow(lam, w_f, n, gamma_before, gamma, low, high, segments, errors, places)
+            middle, half = _window(lam, w_f, above, n, low, high, segments, errors, places)
             coarser, u_coarser, _, _ = _tangency(
-                w_f, lam, n, below, above, middle, half, segments // 2, tolerance, zoom
+                lam, w_f, n, below, above, middle, half, segments // 2, tolerance, zoom
             )
-            coarse, u_coarse, _, _ = _tangency(w_f, lam, n, below, above, middle, half, segments, tolerance, zoom)
+            coarse, u_coarse, _, _ = _tangency(lam, w_f, n, below, above, middle, half, segments, tolerance, zoom)
             fine, u_fine, width, step = _tangency(
-                w_f, lam, n, below, above, middle, half, 2 * segments, tolerance, zoom
+                lam, w_f, n, below, above, middle, half, 2 * segments, tolerance, zoom
             )
             # Another pair caught in the window gives an earlier speed again; a truncation error this large, anything.
             sound = fine > previous and abs(fine - coarse) <= TRUSTED * fine

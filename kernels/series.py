@@ -40,7 +40,7 @@ def _add_product(c, a, b, k, first, last, factor, jets, q, at):
         left, right = c[a, jets[m, 0]], c[b, jets[m, 1]]
         total = 0.0
         for order in range(np.uint64(first), np.uint64(last)):
-            total += left[order] * right[np.uint64(k) - order]
+            total += left[order] * right[np.uint64(k) - np.uint64(order)]
         c[q, jets[m, 2], at] += factor * total
 
 

@@ -8,8 +8,8 @@ import numba
 import numpy as np
 
 from towatlas.kernels.compiling import parallel_kernel
-from towatlas.kernels.drag import STATE, shoot_drag
-from towatlas.kernels.folds import solve_folds
+from towatlas.kernels.drag import STATE, Algebra, Reached, Shots, shoot_drag
+from towatlas.kernels.folds import Cables, Folds, solve_folds
 from towatlas.kernels.lanes import march
 from towatlas.kernels.scan import forward_shots, scan_system
 
@@ -27,27 +27,28 @@ def _march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts
         march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts, statuses, begin, stop)
 
 
-def _solve_folds(n, w_f, lam, excess, a, gamma, slopes, results, error, statuses):
+def _solve_folds(lam, w_f, n, excess, a, gamma, slopes, states, error, statuses):
     rows = len(n)
     for block in numba.prange((rows + FOLDS_BLOCK - 1) // FOLDS_BLOCK):
         begin = block * FOLDS_BLOCK
         stop = min(rows, begin + FOLDS_BLOCK)
-        solve_folds(n, w_f, lam, excess, a, gamma, slopes, results, error, statuses, begin, stop)
+        # numba takes no tuples into a parallel loop: they are made inside.
+        solve_folds(Cables(lam, w_f, n, excess), Folds(a, gamma, slopes, states, error, statuses), begin, stop)
 
 
-def _forward_shots(w_f, lam, gamma, r_x0, segments, errors, x_end, r_x_end):
-    rows = len(w_f)
+def _forward_shots(lam, w_f, gamma, r_x0, segments, errors, x_end, r_x_end):
+    rows = len(lam)
     for block in numba.prange((rows + FORWARD_BLOCK - 1) // FORWARD_BLOCK):
         begin = block * FORWARD_BLOCK
         stop = min(rows, begin + FORWARD_BLOCK)
-        forward_shots(w_f, lam, gamma, r_x0, segments, errors, x_end, r_x_end, begin, stop)
+        forward_shots(lam, w_f, gamma, r_x0, segments, errors, x_end, r_x_end, begin, stop)
 
 
-def _scan_systems(w_f, lam, gamma_low, gamma_high, speeds, guesses, segments, n_max, tolerance, results, statuses):
-    for row in numba.prange(len(w_f)):
+def _scan_systems(lam, w_f, gamma_low, gamma_high, speeds, guesses, segments, n_max, tolerance, results, statuses):
+    for row in numba.prange(len(lam)):
         scan_system(
-            w_f[row],
             lam[row],
+            w_f[row],
             gamma_low[row],
             gamma_high[row],
             speeds,
@@ -60,13 +61,12 @@ def _scan_systems(w_f, lam, gamma_low, gamma_high, speeds, guesses, segments, n_
         )
 
 
-def _shoot_drag(r, gamma2, systems, shares, jets, places, degree, max_steps, results, steps, statuses):
+def _shoot_drag(r, gamma2, systems, shares, products, places, degree, max_steps, state, steps, statuses):
     none = np.empty((0, STATE - 1))
     # A shot takes milliseconds: one a block.
     for row in numba.prange(len(r)):
-        shoot_drag(
-            r, gamma2, systems, shares, jets, places, degree, max_steps, none, results, steps, statuses, row, row + 1
-        )
+        shots, reached = Shots(r, gamma2, systems, shares), Reached(state, steps, statuses)
+        shoot_drag(shots, Algebra(products, places, degree), max_steps, none, reached, row, row + 1)
 
 
 march_parallel = parallel_kernel(_march)

@@ -1,10 +1,12 @@
-"""Shots for tests: the kernels' arrays allocated, one call, named results."""
+"""What several tests use: shots with named results, random cables, small files, a wet scene, the shell."""
 
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from towatlas.builders.grids import Grid, ScanSettings
+from towatlas.cli import main
 from towatlas.kernels.lanes import END_COLUMNS, FOLD_COLUMNS, march
 from towatlas.kernels.scan import forward_shots
 from towatlas.kernels.sweeps import march_parallel
@@ -45,7 +47,7 @@ def boundary_error(w_f, lam, gamma, r_x0, segments=100) -> np.ndarray:
     """E of forward shots."""
     w_f, lam, gamma, r_x0 = (np.array(x, float).ravel() for x in np.broadcast_arrays(w_f, lam, gamma, r_x0))
     errors, x, force = (np.empty(len(w_f)) for _ in range(3))
-    forward_shots(w_f, lam, gamma, r_x0, segments, errors, x, force, 0, len(w_f))
+    forward_shots(lam, w_f, gamma, r_x0, segments, errors, x, force, 0, len(w_f))
     return errors
 
 
@@ -56,3 +58,52 @@ def random_cables(rows, seed, n_max=6, excess=(1e-3, 1e3), w_f_max=1e4):
     w_f = np.where(rng.random(rows) < 0.1, 0.0, 10.0 ** rng.uniform(-5, np.log10(w_f_max), rows))
     excess = 10.0 ** rng.uniform(*np.log10(excess), rows)
     return n, w_f, threshold_length(w_f, n) + excess
+
+
+def root_near(w_f, lam, gamma, guess, segments=100):
+    """Root of E(R_x0) near a guess, by secants."""
+    low, high = guess * (1 - 1e-7), guess * (1 + 1e-7)
+    e_low, e_high = boundary_error(w_f, lam, gamma, [low, high], segments)
+    for _ in range(20):
+        if e_high == e_low or abs(high - low) < 1e-15 * abs(high):
+            break
+        low, high = high, high - e_high * (high - low) / (e_high - e_low)
+        e_low, e_high = e_high, boundary_error(w_f, lam, gamma, high, segments)[0]
+    return high
+
+
+# A file made in a second.
+SMALL_GRID = Grid(
+    n_max=2, series_w_f=6, series_excess=8, error_blocks=2, w_f=np.array([0.0, 1.0]), lam=np.array([3.0, 9.0])
+)
+SMALL_SCAN = ScanSettings(speeds=40, guesses=64, w_f=np.array([1.0]), lam=np.array([5.0]), n_max=2)
+
+
+def run(capsys, *arguments):
+    try:
+        code = main([str(a) for a in arguments])
+    except SystemExit as exit_:
+        code = exit_.code
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+WET = {
+    "cable": {"length": 150, "mass_per_length": 0.5, "diameter": 0.012, "drag_coefficient": 1.4},
+    "fish": {"mass": 60, "volume": 0.02, "added_mass": 10, "drag_coefficient": 0.8, "frontal_area": 0.05},
+    "tow": {"radius": 40, "speed": 2.0},
+    "fluid": {"density": 1025},
+}
+
+
+def changed(**changes):
+    """The wet scene with keys "section__key" set, or removed where None, or a whole section."""
+    table = {section: dict(keys) for section, keys in WET.items()}
+    for name, value in changes.items():
+        section, _, key = name.partition("__")
+        holder = table.setdefault(section, {}) if key else table
+        if value is None:
+            del holder[key or section]
+        else:
+            holder[key or section] = value
+    return table

@@ -7,18 +7,9 @@ import sys
 
 import numpy as np
 import pytest
+from helpers import run
 
 import towatlas
-from towatlas.cli import main
-
-
-def run(capsys, *arguments):
-    try:
-        code = main([str(a) for a in arguments])
-    except SystemExit as exit_:
-        code = exit_.code
-    captured = capsys.readouterr()
-    return code, captured.out, captured.err
 
 
 @pytest.fixture
@@ -29,7 +20,7 @@ def critical(capsys, atlas_path):
 def test_json(critical):
     code, out, err = critical("--lam", 37.8, "--wf", 1352, "--n", 2, "--json")
     (row,) = json.loads(out)
-    assert list(row) == ["n", "lam", "w_f", "gamma", "R_x0", "x_f", "error", "status"]
+    assert list(row) == ["schema_version", "n", "lam", "w_f", "gamma", "R_x0", "x_f", "error", "status"]
     assert (row["n"], row["lam"], row["w_f"], row["status"]) == (2, 37.8, 1352, "computed")
     exact = towatlas.solve_critical(37.8, 1352, 2)
     for name in ("gamma", "R_x0", "x_f"):
@@ -189,6 +180,7 @@ def test_installed_command(tmp_path):
     assert done.stdout.startswith("towatlas ")
 
 
+@pytest.mark.slow
 def test_compilation_is_announced_once(tmp_path):
     """Who waits for a kernel the first time is told why, on stderr; the second time there is nothing to tell."""
     command = [sys.executable, "-m", "towatlas", "critical", "--solve", "--lam", "10", "--wf", "0", "--n", "1"]
@@ -197,3 +189,27 @@ def test_compilation_is_announced_once(tmp_path):
     assert first.stdout == second.stdout
     assert "compiling, once" in first.stderr
     assert second.stderr == ""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("critical", "--lam", 10, "--wf", 0),
+        ("critical", "--lam", 10, "--wf", 0, "--n", 1, "--C", 0.01, "--solve"),
+        ("equilibria", "--lam", 10, "--wf", 0, "--gamma", 1),
+        ("equilibria", "--lam", 10, "--wf", 0, "--gamma", 1, "--C", 0.01),
+        ("fish", "--lam", 5, "--wf", 1, "--gamma", 0.5),
+        ("scene", "skop-fig3", "--model", "vacuum"),
+        ("design", "--scene", "skop-fig3", "--depth", "25in", "--model", "vacuum"),
+    ],
+    ids=lambda arguments: arguments[0] + (" with drag" if "--C" in arguments else ""),
+)
+def test_every_object_of_json_says_its_schema(capsys, atlas_path, equilibria_path, arguments):
+    from towatlas.commands.common import JSON_SCHEMA
+
+    files = {"fish": ("--table", equilibria_path), "equilibria": ()}.get(arguments[0], ("--atlas", atlas_path))
+    code, out, _ = run(capsys, *arguments, *files, "--json")
+    answer = json.loads(out)
+    assert code == 0
+    for row in answer if isinstance(answer, list) else [answer]:
+        assert next(iter(row.items())) == ("schema_version", JSON_SCHEMA)

@@ -46,6 +46,7 @@ def probe(folder, cache):
     return float(value), int(hits), int(misses)
 
 
+@pytest.mark.slow
 def test_cache_serves_no_old_kernel(tmp_path):
     """Change the equation in one file: the kernel in another, which is cached, must follow.
 
@@ -106,7 +107,16 @@ def flip(content):
 
 
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
-@pytest.mark.parametrize("damage", [cut, flip, lambda content: b"", lambda content: b"x" * 100])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        cut,
+        pytest.param(flip, marks=pytest.mark.slow),
+        pytest.param(lambda content: b"", marks=pytest.mark.slow),
+        pytest.param(lambda content: b"x" * 100, marks=pytest.mark.slow),
+    ],
+    ids=["cut", "flipped", "empty", "junk"],
+)
 def test_damaged_cache_is_made_again(tmp_path, ending, damage):
     """One line says so, once; the answer is that of the whole kernel, and the next process finds one."""
     value, hits = run(SHOT, tmp_path)[0].split()

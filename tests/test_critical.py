@@ -31,6 +31,7 @@ def test_known_values(lam, w_f, n, gamma):
     assert float(towatlas.solve_critical(lam, w_f, n).gamma) == pytest.approx(gamma, abs=0.6 * 10.0**-digits)
 
 
+@pytest.mark.slow
 def test_error_against_mpmath():
     """The error estimate holds against one Newton step in 34 digits, over the domain and at its edges."""
     cables = [
@@ -65,10 +66,16 @@ def test_guess_does_not_matter():
 
     n, w_f, lam = random_cables(2000, 7)
     excess = excess_length(lam, w_f, n)
-    right = solve_rows(n, w_f, lam, excess)
+    right = solve_rows(n=n, w_f=w_f, lam=lam, excess=excess)
     rng = np.random.default_rng(0)
     a, gamma = np.abs(right["x_f"]) * right["gamma"] ** 2, right["gamma"]
-    wrong = solve_rows(n, w_f, lam, excess, (a * 3 ** rng.uniform(-1, 1, 2000), gamma * 3 ** rng.uniform(-1, 1, 2000)))
+    wrong = solve_rows(
+        n=n,
+        w_f=w_f,
+        lam=lam,
+        excess=excess,
+        guess=(a * 3 ** rng.uniform(-1, 1, 2000), gamma * 3 ** rng.uniform(-1, 1, 2000)),
+    )
     assert set(wrong["status"]) == {status.OK}
     assert (np.abs(wrong["gamma"] / gamma - 1) <= wrong["error"] + right["error"]).all()
 
@@ -109,7 +116,7 @@ def test_threshold_is_approached_as_an_inverse_square_root(n, w_f):
     from towatlas.solve.critical import solve_rows
 
     ones = np.ones(3)
-    states = solve_rows(np.full(3, n), w_f * ones, threshold_length(w_f, n) + excess, excess)
+    states = solve_rows(n=np.full(3, n), w_f=w_f * ones, lam=threshold_length(w_f, n) + excess, excess=excess)
     k = states["gamma"] * np.sqrt(excess)
     assert k == pytest.approx(k[0], rel=0.05)
     # The nearer, the straighter; an error d of lambda_cn would change k by d / (2 excess), most of all at the nearest.

@@ -4,10 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from helpers import boundary_error, random_cables
+from helpers import boundary_error, random_cables, run
 from hypothesis import given
 from hypothesis import strategies as st
-from test_cli import run
 
 import towatlas
 from towatlas.kernels import status
@@ -42,15 +41,19 @@ def test_count_identity():
     assert (expected == 1).sum() > 20
     for e in found:
         assert (np.diff(e.R_x0) > 0).all()
-        assert e.median.sum() == 1
-        assert e.median[len(e) // 2]
-        # The median root is the inner member of the last pair, the fish nearest to the axis.
-        assert e.nodes[e.median] == e.nodes.max()
-        assert np.abs(e.x_f[e.median]) == np.abs(e.x_f).min()
+        # The median root, expected, is the inner member of the last pair, the fish nearest to the axis.
+        assert e.expected == len(e) // 2
+        assert e.nodes[e.expected] == e.nodes.max()
+        assert e.r_f[e.expected] == e.r_f.min()
+        last = e.nodes.max()
+        assert e.branch[e.expected] == (f"{last} inner" if last else "outward")
+        assert sorted(e.branch) == sorted(
+            ["outward"] + [f"{n} {member}" for n in range(1, last + 1) for member in ("inner", "outer")]
+        )
         # Nodes come in pairs: 0, then two shapes for each number up to the highest.
         assert sorted(e.nodes) == sorted([0, *np.repeat(np.arange(1, len(e) // 2 + 1), 2)])
         assert e.nodes[-1] == 0
-        assert (np.abs(e.x_f) <= 1 + e.lam).all()
+        assert (np.abs(e.x_f) <= 1 + e.system.lam).all()
         # Near a fold x_f is a root of a function with hardly a slope: a few of these 2452 lie there.
         assert (e.error < 1e-10).all()
     assert np.median(np.concatenate([e.error for e in found])) < 1e-14
@@ -67,8 +70,8 @@ def test_count_identity():
 )
 def test_roots_of_the_report(lam, w_f, gamma, root, nodes):
     e = towatlas.equilibria(lam, w_f, gamma)
-    assert float(e.R_x0[e.median][0]) == pytest.approx(root, abs=6e-8)
-    assert e.nodes[e.median][0] == nodes
+    assert float(e.R_x0[e.expected]) == pytest.approx(root, abs=6e-8)
+    assert e.nodes[e.expected] == nodes
 
 
 def test_crowded_roots():
@@ -101,9 +104,16 @@ def test_both_members_appear_at_the_fold(distance):
     n, w_f, lam, gamma = n[sure], w_f[sure], lam[sure], fold.gamma[sure]
     x_fold = np.abs(fold.x_f[sure])
     inner = np.zeros(len(n), bool)
-    passed = {outer: solve_members(w_f, lam, gamma * (1 + distance), n, inner | outer, shoot_lanes) for outer in (0, 1)}
+    passed = {
+        outer: solve_members(
+            w_f=w_f, lam=lam, gamma=gamma * (1 + distance), n=n, outer=inner | outer, shoot=shoot_lanes
+        )
+        for outer in (0, 1)
+    }
     for outer in (0, 1):
-        short = solve_members(w_f, lam, gamma * (1 - distance), n, inner | outer, shoot_lanes)
+        short = solve_members(
+            w_f=w_f, lam=lam, gamma=gamma * (1 - distance), n=n, outer=inner | outer, shoot=shoot_lanes
+        )
         assert (short.status == status.NOT_FOUND).all()
         assert (passed[outer].status == status.OK).all()
     assert (np.abs(passed[0].x_f) < np.abs(passed[1].x_f)).all()
@@ -133,9 +143,9 @@ def test_one_shot_or_lanes():
 def test_a_bad_guess_costs_time_only(shoot):
     w_f, lam, gamma = (np.full(5, value) for value in (1352.0, 37.8, 5.94))
     n, outer = np.array([0, 1, 1, 2, 2]), np.array([False, False, True, False, True])
-    plain = solve_members(w_f, lam, gamma, n, outer, shoot)
+    plain = solve_members(w_f=w_f, lam=lam, gamma=gamma, n=n, outer=outer, shoot=shoot)
     for guess in (np.full(5, 1e-11), np.full(5, np.nan), np.full(5, -1.0), np.full(5, 1e30), plain.a[::-1], plain.a):
-        again = solve_members(w_f, lam, gamma, n, outer, shoot, guess)
+        again = solve_members(w_f=w_f, lam=lam, gamma=gamma, n=n, outer=outer, shoot=shoot, guess=guess)
         np.testing.assert_allclose(again.R_x0, plain.R_x0, rtol=1e-12)
 
 
@@ -218,11 +228,12 @@ def test_shell(capsys):
     rows = json.loads(out)
     assert code == 0
     assert err == "" or "compiling, once" in err
-    assert list(rows[0]) == ["R_x0", "x_f", "z_f", "tension", "nodes", "median", "boundary_error"]
-    assert [row["median"] for row in rows] == [False, False, True, False, False]
+    names = "R_x0 R_y0 R_z0 x_f y_f z_f r_f lag tension error boundary_error"
+    assert list(rows[0]) == ["schema_version", "branch", "nodes", "expected", *names.split()]
+    assert [row["expected"] for row in rows] == [False, False, True, False, False]
     assert rows[2]["R_x0"] == pytest.approx(534.2432718, abs=6e-8)
     code, out, _ = run(capsys, "equilibria", "--lam", 37.8, "--wf", 1352, "--gamma", 5.94)
     assert code == 0
     assert len(out.splitlines()) == 6
-    assert "median" in out.splitlines()[3]
+    assert "expected" in out.splitlines()[3]
     assert run(capsys, "equilibria", "--lam", 3, "--wf", 0, "--gamma", 0)[0] == 2

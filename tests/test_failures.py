@@ -47,7 +47,7 @@ def test_layers_thinner_than_a_step(lam, w_f, gamma):
     assert (fine > coarse / 16).any()
     # And the root that 100 segments lead to, where there is one, is not the one of the equations.
     k = crossed[-1]
-    off = abs(rk4_root(lam, w_f, gamma, e.R_x0[k]) - e.R_x0[k]) / e.tension[k]
+    off = abs(rk4_root(lam=lam, w_f=w_f, gamma=gamma, guess=e.R_x0[k]) - e.R_x0[k]) / e.tension[k]
     assert off > 1e-3
 
 
@@ -285,6 +285,7 @@ ANY_SIZE = st.floats(-320, 308).map(lambda e: 10.0**e)
 LARGE_OR_SMALL = st.floats(-10, 10).map(lambda e: 10.0**e)
 
 
+@pytest.mark.slow
 @given(lam=ANY_SIZE, w_f=st.one_of(st.just(0.0), ANY_SIZE), n=st.integers(1, 10**4))
 def test_critical_state_of_any_size(lam, w_f, n):
     if not lam > 0:
@@ -300,6 +301,7 @@ def test_critical_state_of_any_size(lam, w_f, n):
         assert np.isnan([state.gamma, state.R_x0, state.x_f, state.z_f, state.error]).all()
 
 
+@pytest.mark.slow
 @example(lam=1.0, w_f=0.0, gamma=1e-155)
 @example(lam=1.0, w_f=0.0, gamma=1e-161)
 @example(lam=2.5e-16, w_f=8.5e-11, gamma=57559.0)

@@ -13,20 +13,16 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from helpers import SMALL_GRID, SMALL_SCAN
 
 import towatlas
 from towatlas.builders.critical import build_atlas
-from towatlas.builders.grids import Grid, ScanSettings
+from towatlas.builders.grids import ScanSettings
 from towatlas.kernels import status
 from towatlas.tables.seal import AtlasFileError, read_sealed, write_seal
 
+
 # Seconds rather than minutes: the same pipeline on few nodes.
-SMALL_GRID = Grid(
-    n_max=2, series_w_f=6, series_excess=8, error_blocks=2, w_f=np.array([0.0, 1.0]), lam=np.array([3.0, 9.0])
-)
-SMALL_SCAN = ScanSettings(speeds=40, guesses=64, w_f=np.array([1.0]), lam=np.array([5.0]), n_max=2)
-
-
 def small(path, **more):
     return build_atlas(path, grid=SMALL_GRID, scan=SMALL_SCAN, progress=False, **more)
 
@@ -91,6 +87,7 @@ def test_attributes_are_ascii_and_complete(atlas_path):
         assert texts[name]
 
 
+@pytest.mark.slow
 def test_same_bytes_again(atlas_path, tmp_path):
     """A second build, in another process with one thread everywhere, is the same file."""
     again = tmp_path / "again.nc"
@@ -166,7 +163,7 @@ def test_scan_build_holds_a_plain_table(tmp_path):
     path = tmp_path / "scan.nc"
     scan = ScanSettings(speeds=120, guesses=256, w_f=np.array([0.0, 5.0]), lam=np.array([1.5, 5.0, 12.0]), n_max=3)
     summary = build_atlas(path, "scan", scan=scan, progress=False)
-    assert summary.folds > 5
+    assert int(dict(summary.facts)["folds"]) > 5
     with xr.open_dataset(path) as table:
         exact = towatlas.solve_critical(table.lam.values, table.w_f.values[:, None], table.n.values[:, None, None])
         found = table.status.values == status.OK
@@ -185,7 +182,7 @@ def test_places_that_cannot_be_written(tmp_path):
 
 
 def test_bad_build_arguments(tmp_path):
-    with pytest.raises(ValueError, match="method must be fold or scan"):
+    with pytest.raises(ValueError, match="method must be one of fold, scan"):
         build_atlas(tmp_path / "a.nc", "guess")
     with pytest.raises(ValueError, match="threads must be 1 to"):
         small(tmp_path / "a.nc", threads=1000)
@@ -257,6 +254,7 @@ def test_full_disk_leaves_the_old_file_whole(small_path, tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.slow
 def test_two_builds_at_once(tmp_path, atlas_path):
     path = tmp_path / "atlas.nc"
     command = [sys.executable, "-m", "towatlas", "build", "--out", str(path), "--quiet", "--threads", "1"]

@@ -4,10 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from helpers import boundary_error
+from helpers import boundary_error, root_near
 from hypothesis import given
 from hypothesis import strategies as st
-from scan_tools import root_near
 
 from towatlas.kernels.scan import forward_shots
 from towatlas.kernels.sweeps import forward_shots_parallel

@@ -12,21 +12,20 @@ import numba
 import numpy as np
 import pytest
 import reference_drag
-from helpers import boundary_error, shoot
+from helpers import boundary_error, root_near, shoot
 from numpy.polynomial import chebyshev
-from scan_tools import root_near
 
 import towatlas
 from towatlas.kernels import status
 from towatlas.kernels.fold_predictor import seed_folds
-from towatlas.kernels.folds import solve_folds
+from towatlas.kernels.folds import Cables, Folds, solve_folds
 from towatlas.kernels.scan import forward_shots, scan_system
 from towatlas.kernels.sweeps import forward_shots_parallel, scan_systems_parallel, solve_folds_parallel
 from towatlas.limits import excess_length, long_cable, massless_cable
-from towatlas.solve.drag_shots import System
 from towatlas.solve.drag_shots import shoot as shoot_drag
 from towatlas.solve.jets import jets_of
 from towatlas.solve.members import shoot_singly
+from towatlas.system import System
 
 EPS = 2.0**-52
 INTERPRETED = bool(numba.config.DISABLE_JIT)
@@ -57,14 +56,14 @@ def folds_of(lam, w_f, n, parallel=False):
     n = np.array(n, np.int64)
     rows = len(n)
     a, gamma, slopes = np.zeros(rows), np.zeros(rows), np.full((rows, 4), np.nan)
-    results, error, codes = np.empty((rows, 4)), np.empty(rows), np.empty(rows, np.int64)
-    arguments = (n, w_f, lam, excess_length(lam, w_f, n), a, gamma, slopes, results, error, codes)
+    cables = Cables(lam, w_f, n, excess_length(lam, w_f, n))
+    folds = Folds(a, gamma, slopes, np.empty((rows, 4)), np.empty(rows), np.empty(rows, np.int64))
     if parallel:
-        solve_folds_parallel(*arguments)
+        solve_folds_parallel(*cables, *folds)
     else:
-        solve_folds(*arguments, 0, rows)
-    assert set(codes) == {status.OK}
-    return np.column_stack([results, error])
+        solve_folds(cables, folds, 0, rows)
+    assert set(folds.statuses) == {status.OK}
+    return np.column_stack([folds.states, folds.error])
 
 
 def scan_of(lam, w_f, parallel=False):
@@ -72,10 +71,10 @@ def scan_of(lam, w_f, parallel=False):
     results, codes = np.empty((1, 1, 4)), np.empty((1, 1), np.int64)
     low, high = 0.95 / np.sqrt(lam), 3.0
     if parallel:
-        cable = np.array([w_f]), np.array([lam]), np.array([low]), np.array([high])
+        cable = np.array([lam]), np.array([w_f]), np.array([low]), np.array([high])
         scan_systems_parallel(*cable, 12, 32, 12, 1, 1e-5, results, codes)
     else:
-        scan_system(w_f, lam, low, high, 12, 32, 12, 1, 1e-5, results[0], codes[0])
+        scan_system(lam, w_f, low, high, 12, 32, 12, 1, 1e-5, results[0], codes[0])
     assert codes[0, 0] == status.OK
     return results[0, 0]
 
@@ -94,7 +93,7 @@ def predictor(count):
     series, span, w_scale = rng.normal(size=(2, 3, 5)), np.array([-1.0, 2.0, 0.0, 3.0]), 0.7
     excess, w_f = np.exp(rng.uniform(-1, 2, count)), w_scale * np.expm1(rng.uniform(0, 3, count))
     a, gamma, slopes = np.empty(count), np.empty(count), np.empty((count, 4))
-    seed_folds(series, excess, w_f, span, w_scale, a, gamma, slopes, 0, count)
+    seed_folds(series, w_f, excess, span, w_scale, a, gamma, slopes, 0, count)
     return series, excess, w_f, span, w_scale, a, gamma, slopes
 
 

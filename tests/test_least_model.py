@@ -3,24 +3,26 @@
 import json
 import tomllib
 from dataclasses import replace
-from math import inf, nan
+from math import nan
 from pathlib import Path
 
 import numpy as np
 import pytest
 import reference_drag
-from test_cli import run
-from test_scene import changed
+from helpers import changed, run
 
 import towatlas
 from benchmarks import models
 from towatlas.commands.scene import text_of
+from towatlas.kernels import status
 from towatlas.report.page import PHOTOGRAPHS
-from towatlas.scene.answers import answer_scene
+from towatlas.scene.choice import choose, compare, least_model
 from towatlas.scene.file import make_scene, read_scene
-from towatlas.scene.model_folds import ModelFolds, follow_folds, model_folds
-from towatlas.scene.models import QUESTIONS, check_questions, choose, compare, least_model, solvable_models, solve_model
-from towatlas.solve.drag_shots import System
+from towatlas.scene.jumps import answer_scene
+from towatlas.scene.models import QUESTIONS, check_questions, solvable_models, solve_model
+from towatlas.scene.pairs import PairSpeeds, follow_folds, pair_speeds
+from towatlas.solve.equilibria import solve_equilibria
+from towatlas.system import System
 
 HANGS = ("nodes", "position", "tension")
 PAGE = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text()
@@ -58,19 +60,19 @@ def test_a_fold_that_drag_takes_away():
     answer = answer_scene(scene)
     assert answer.choice.model == "air"
     gone = [d for d in answer.choice.differences if not d.agrees]
-    assert {(d.smaller, d.quantity, d.by_larger) for d in gone} == {("vacuum", "critical speed 2", inf)}
+    assert {(d.smaller, d.quantity, d.status_larger) for d in gone} == {("vacuum", "critical speed 2", status.NO_PAIR)}
     assert "vacuum differs from air in critical speed 2 (1.4" in answer.choice.reason
     assert "air agrees with water within 1 %, at most 0.0" in answer.choice.reason
     assert answer.equilibria is answer.choice.answer.equilibria
-    assert answer.equilibria.C == scene.groups("air").C
+    assert answer.equilibria.system.C == scene.system("air").C
     assert answer_scene(scene, asked=HANGS).choice.model == "vacuum"
     text = text_of(answer)
     lines = text.splitlines()
     assert sum(line.startswith("vacuum  air ") and line.endswith("disagrees") for line in lines) == 1
-    (row,) = (line.split() for line in lines if line.split()[:3] == ["2", "never", "never"])
+    (row,) = (line.split() for line in lines if line.split()[:3] == ["2", "no_pair", "no_pair"])
     assert float(row[3]) == pytest.approx(0.018, abs=1e-4)
     assert float(row[4]) < float(row[3])
-    assert text.count("near axis") == 1
+    assert text.count("  expected") == 1
 
 
 def test_buoyancy_without_drag():
@@ -89,10 +91,12 @@ def test_buoyancy_without_drag():
 def test_differences():
     """Of two answers made up."""
     scene = make_scene(changed(fluid={"name": "vacuum"}))
-    one = solve_model(scene, "vacuum", (1, 2, 3, 4, 5), (1.0, inf, inf, nan, 2.0))
-    folds = ModelFolds.of_vacuum((1, 2, 3, 4, 5), (1.005, inf, 3.0, nan, 2.1))
+    ok, gone, lost = status.OK, status.NO_PAIR, status.NOT_CONVERGED
+    first = PairSpeeds.of_vacuum((1, 2, 3, 4, 5), (1.0, nan, nan, nan, 2.0), (ok, gone, gone, lost, ok))
+    one = solve_model(scene, "vacuum", first)
+    pairs = PairSpeeds.of_vacuum((1, 2, 3, 4, 5), (1.005, nan, 3.0, nan, 2.1), (ok, gone, ok, lost, ok))
     moved = one.position + np.array([0.0, 0.0, 1.0])
-    other = replace(one, model="air", folds=folds, position=moved, tension=one.tension * 1.005, nodes=one.nodes + 1)
+    other = replace(one, model="air", speeds=pairs, position=moved, tension=one.tension * 1.005, nodes=one.nodes + 1)
     found = {d.quantity: d for d in compare(one, other, scene, (1, 2, 3, 4, 5))}
     slant = np.linalg.norm(moved - [40.0, 0.0, 0.0])
     assert found["position of the fish"].relative == pytest.approx(1.0 / slant, rel=1e-12)
@@ -156,10 +160,9 @@ def test_far_beyond_the_drag_of_the_report():
     """The scene of the page, C = 559: a long-double shot from its fish comes to the tow point, with its tension."""
     scene = make_scene(tomllib.loads(PAGE_SCENE))
     answer = solve_model(scene, "water")
-    groups = answer.groups
-    assert groups.C > 500
-    system = System(groups.lam, groups.w_f, groups.m_f, groups.C, groups.C_f, groups.w)
-    end = reference_drag.shot(np.hypot(*answer.position[:2]) / scene.radius, groups.gamma, system)
+    system = answer.system
+    assert system.C > 500
+    end = reference_drag.shot(np.hypot(*answer.position[:2]) / scene.radius, scene.gamma, system)
     x, y, z, *force = np.asarray(end, float)
     assert np.hypot(x, y) == pytest.approx(1.0, abs=1e-10)
     assert -z * scene.radius == pytest.approx(answer.position[2], rel=1e-10)
@@ -173,21 +176,19 @@ def test_folds_of_a_bare_cable_scale():
     """Loads over w: the cable of weight w at gamma is the one of weight 1 at gamma / sqrt(w), with the same C."""
     w = 0.6
     start, end = System(10.0, 0.0, 0.0, 0.02), System(10.0, 0.0, 0.0, 0.02, w=w)
-    folds = towatlas.solve.drag_folds.solve_drag_folds(10.0, 0.0, 0.02, n=[1, 2])
-    found = follow_folds(folds.r_f_appears, folds.appears, start, end)
+    folds = towatlas.solve_drag_folds(10.0, 0.0, 0.02, n=[1, 2])
+    found, codes = follow_folds(folds.r_f_appears, folds.appears, folds.status, start, end)
+    assert (codes == status.OK).all()
     assert found == pytest.approx(folds.appears * np.sqrt(w), rel=1e-9)
 
 
 def test_folds_in_a_dense_fluid():
     """Two equilibria more beyond one: the search from the other side, at given speed."""
-    groups = replace(read_scene("skop-fig3").groups("water"), w=0.7, m_f=1600.0, C=0.01, C_f=0.5)
-    folds = model_folds(groups, (2, 3))
-    assert np.isfinite(folds.appears).any()
-    for gamma in folds.appears[np.isfinite(folds.appears)]:
-        below, above = (
-            len(towatlas.equilibria(groups.lam, groups.w_f, gamma * part, groups.C, groups.m_f, groups.C_f, groups.w))
-            for part in (0.998, 1.002)
-        )
+    system = replace(read_scene("skop-fig3").system("water"), w=0.7, m_f=1600.0, C=0.01, C_f=0.5)
+    pairs = pair_speeds(system, (2, 3))
+    assert (pairs.status == status.OK).any()
+    for gamma in pairs.appears[pairs.status == status.OK]:
+        below, above = (len(solve_equilibria(system, gamma * part)) for part in (0.998, 1.002))
         assert above == below + 2
 
 
@@ -200,7 +201,7 @@ def test_shell(capsys, tmp_path):
     nodes, tension = answer["comparisons"][:2]
     assert (nodes["by_smaller"], nodes["by_larger"], nodes["agrees"]) == (2, 3, False)
     assert tension["relative_difference"] == pytest.approx(0.0955, abs=1e-4)
-    near = next(row for row in answer["equilibria"] if row["near_axis"])
+    near = next(row for row in answer["equilibria"] if row["expected"])
     assert near["nodes"] == 3
     assert near["r_f_m"] == pytest.approx(np.hypot(near["x_f_m"], near["y_f_m"]), rel=1e-12)
     assert near["lag_deg"] == pytest.approx(np.degrees(np.arctan2(-near["y_f_m"], near["x_f_m"])), rel=1e-9)
@@ -219,19 +220,19 @@ def test_design_says_where_the_vacuum_fails(capsys, tmp_path):
     code, out, err = run(capsys, *arguments, "--json")
     assert code == 0
     (row,) = json.loads(out)["cables"]
-    assert row["median"]
+    assert row["expected"]
     by = row["by_model"]
     exact = solve_model(replace(make_scene(tomllib.loads(PAGE_SCENE)), length=row["length_m"]), "water")
     assert (by["model"], by["nodes"]) == ("water", exact.nodes)
     assert [by["x_f_m"], by["y_f_m"], by["z_f_m"]] == pytest.approx(list(exact.position), rel=1e-9)
     assert by["z_f_m"] < 110
-    assert "does not hold for 1 of 1 median shapes" in err
-    assert "median, by water 102." in run(capsys, *arguments)[1]
+    assert "does not hold for 1 of 1 expected shapes" in err
+    assert "expected, by water 102." in run(capsys, *arguments)[1]
     code, out, err = run(capsys, *arguments, "--model", "vacuum", "--json")
     assert json.loads(out)["cables"][0]["by_model"] is None
     assert "does not hold" not in err
     arguments = ("design", "--scene", "skop-fig3", "--depth", "25 in", "--max-radius", "1 mm")
-    assert "median, the vacuum model holds" in run(capsys, *arguments, "--atlas", tmp_path / "none.nc")[1]
+    assert "expected, the vacuum model holds" in run(capsys, *arguments, "--atlas", tmp_path / "none.nc")[1]
 
 
 def test_questions_are_named_in_help(capsys):

@@ -13,7 +13,7 @@ N_MAX = 4
 
 def scan(w_f, lam, gamma_max=20.0, speeds=240, guesses=1024, segments=100, n_max=N_MAX):
     results, statuses = np.empty((n_max, 4)), np.empty(n_max, np.int64)
-    scan_system(w_f, lam, 0.95 / np.sqrt(lam), gamma_max, speeds, guesses, segments, n_max, 1e-9, results, statuses)
+    scan_system(lam, w_f, 0.95 / np.sqrt(lam), gamma_max, speeds, guesses, segments, n_max, 1e-9, results, statuses)
     return results, statuses
 
 

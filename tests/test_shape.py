@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import reference
 import xarray as xr
+from helpers import run
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_cli import run
 
 import towatlas
 from towatlas.kernels.steppers import rk4_forward
-from towatlas.plot.critical import plot_shape
+from towatlas.plot.shape import plot_shape
 from towatlas.tables.seal import read_sealed
 
 SYSTEMS = [
@@ -114,7 +114,9 @@ def test_any_order_and_every_root():
         ({"root": 5}, "from 0 to 4"),
         ({"root": -1}, "root must be"),
         ({"root": True}, "root must be"),
-        ({"root": "mean"}, "root must be median"),
+        ({"root": "mean"}, "root must be expected, median"),
+        ({"root": "3 inner"}, "one of the branches 1 outer, 2 outer, 2 inner, 1 inner, outward"),
+        ({"root": "median", "C": 0.018}, "got 'median'"),
         ({"s": [1.0, 38.0]}, "from 0 to lam = 37.8"),
         ({"s": [np.nan]}, "arc lengths"),
         ({"s": [[1.0]]}, "arc lengths"),
@@ -132,7 +134,7 @@ def test_shell_files(capsys, tmp_path):
     assert code == 0
     comment, header, *rows = out.splitlines()
     assert comment.startswith("# lam = 10.0, w_f = 1.0, gamma = 0.6, R_x0 = ")
-    assert header == "s,x,z,R_x,R_z,T"
+    assert header == "s,x,y,z,R_x,R_y,R_z,T"
     assert [float(row.split(",")[0]) for row in rows] == [0, 5, 10]
 
     assert run(capsys, *system, "--root", "outward", "--s", 2, 7, "--out", tmp_path / "a" / "shape.csv")[0] == 0

@@ -112,6 +112,7 @@ def test_count_and_folds_agree():
     assert on_the_way.count[0] == 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [4, 8, 12])
 def test_order_of_the_taylor_step(order):
     """Halving a forced step divides the error of one step by 2^(order + 1)."""

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import reference
 import xarray as xr
-from test_cli import run
+from helpers import run
 
 import towatlas
 from towatlas.builders.fish import build_equilibria
@@ -23,7 +23,7 @@ from towatlas.tables.seal import AtlasFileError, read_sealed
 
 @pytest.fixture(scope="module")
 def table(equilibria_path):
-    return towatlas.open_equilibria(equilibria_path)
+    return towatlas.open_atlas(equilibria_path)
 
 
 def points(rows, seed):
@@ -95,7 +95,7 @@ def test_same_bytes_for_any_number_of_threads(tmp_path, equilibria_path, equilib
 def test_lookup_is_as_good_as_it_says(table, branch):
     lam, w_f, gamma = points(20_000, 3)
     found = table.fish(lam, w_f, gamma, branch, near="nan")
-    nodes, exact = solve_branch(branch, w_f, lam, gamma)
+    nodes, exact = solve_branch(branch=branch, w_f=w_f, lam=lam, gamma=gamma)
     assert (exact.status == status.OK).all()
     inside = found.interpolated
     assert inside.mean() > (0.5 if branch == "median" else 0.98)
@@ -103,7 +103,7 @@ def test_lookup_is_as_good_as_it_says(table, branch):
     np.testing.assert_array_equal(found.nodes[inside], nodes[inside])
     misses = np.max([np.abs(getattr(found, k) / getattr(exact, k) - 1) for k in ("x_f", "z_f")], axis=0)[inside]
     assert (misses <= found.error[inside]).mean() > 0.999
-    assert misses.max() < table.worst_error
+    assert misses.max() < table.positions.worst_error
     assert np.median(misses) < 1e-6
     # With the direct solution next to folds every point has an answer.
     whole = table.fish(lam, w_f, gamma, branch)
@@ -120,11 +120,12 @@ def test_never_across_a_fold(table, lam, w_f, n):
     distance = np.concatenate([-np.logspace(-1.5, -10, 60), np.logspace(-10, -1.5, 60)])
     gamma = gamma_c * (1 + distance)
     found = table.fish(lam, w_f, gamma)
-    np.testing.assert_array_equal(found.nodes, folds_passed(*np.broadcast_arrays(w_f, lam, gamma)))
+    cables = {"lam": np.full(len(gamma), lam), "w_f": np.full(len(gamma), w_f), "gamma": gamma}
+    np.testing.assert_array_equal(found.nodes, folds_passed(**cables))
     assert ((found.nodes == n) == (distance > 0)).all()
     assert (np.sign(found.x_f) == 1 - 2 * (found.nodes % 2)).all()
     at = [towatlas.equilibria(lam, w_f, g) for g in gamma[::10]]
-    exact = np.array([e.x_f[e.median][0] for e in at])
+    exact = np.array([e.x_f[e.expected] for e in at])
     np.testing.assert_allclose(found.x_f[::10], exact, rtol=2e-3)
 
 
@@ -136,16 +137,16 @@ def test_edges_and_outside(table, equilibria_grid):
     )
     assert (corner.status == status.OK).all()
     for point, axis in (((0.9, 1, 1), "lam = 0.9"), ((2, 101, 1), "w_f = 101"), ((2, 1, 0.05), "gamma = 0.05")):
-        with pytest.raises(ValueError, match=f'{axis} is outside the table, .* to .*outside="solve"'):
+        with pytest.raises(ValueError, match=f'{axis} is outside the atlas, .* to .*outside="solve"'):
             table.fish(*point)
         assert table.fish(*point, outside="nan").status == status.OUTSIDE
         assert np.isnan(table.fish(*point, outside="nan").x_f)
         solved = table.fish(*point, outside="solve")
         e = towatlas.equilibria(*point)
-        assert float(solved.x_f) == pytest.approx(e.x_f[e.median][0], rel=1e-11)
+        assert float(solved.x_f) == pytest.approx(e.x_f[e.expected], rel=1e-11)
     bad = table.fish([2.0, np.nan, -1.0, 2.0], [-1.0, 1, 1, 1], [1, 1, 1, np.inf], outside="solve")
     assert (bad.status == status.BAD_INPUT).all()
-    with pytest.raises(ValueError, match=r"nan is outside.*\(1 of 2 points"):
+    with pytest.raises(ValueError, match=r"lam = nan is not finite.*\(1 of 2 points"):
         table.fish([2.0, np.nan], 1, 1)
 
 
@@ -164,16 +165,17 @@ def test_bad_input(table, more, match):
 
 
 def test_other_files_are_refused(equilibria_path, atlas_path, tmp_path):
-    with pytest.raises(AtlasFileError, match="--equilibria"):
-        towatlas.open_equilibria(atlas_path)
-    with pytest.raises(AtlasFileError, match="built with --method equilibria"):
-        towatlas.open_atlas(equilibria_path)
+    with pytest.raises(AtlasFileError, match=r"no fish positions, only critical speeds; .*--equilibria"):
+        towatlas.open_atlas(atlas_path).fish(2.0, 1.0, 1.0)
+    with pytest.raises(AtlasFileError, match="no critical speeds, only fish positions"):
+        towatlas.open_atlas(equilibria_path).critical_speed(5.0, 1.0)
+    assert towatlas.open_atlas(equilibria_path).holds == ("fish positions",)
     torn = tmp_path / "torn.nc"
     torn.write_bytes(equilibria_path.read_bytes()[:-1])
     with pytest.raises(AtlasFileError, match="damaged"):
-        towatlas.open_equilibria(torn)
+        towatlas.open_atlas(torn)
     with pytest.raises(FileNotFoundError):
-        towatlas.open_equilibria(tmp_path / "none.nc")
+        towatlas.open_atlas(tmp_path / "none.nc")
 
 
 def test_shell(capsys, equilibria_path, monkeypatch, tmp_path):
@@ -184,13 +186,13 @@ def test_shell(capsys, equilibria_path, monkeypatch, tmp_path):
     assert [row["branch"] for row in rows] == ["median", "outward"]
     assert rows[0]["nodes"] == 1
     e = towatlas.equilibria(8, 1, 0.9)
-    assert rows[0]["x_f"] == pytest.approx(e.x_f[e.median][0], rel=rows[0]["error"])
+    assert rows[0]["x_f"] == pytest.approx(e.x_f[e.expected], rel=rows[0]["error"])
     code, out, _ = run(capsys, *system, "--gamma", 0.9, "--branch", "median")
     assert code == 0
     assert len(out.splitlines()) == 2
     code, out, err = run(capsys, *system, "--gamma", 50)
     assert (code, out) == (3, "")
-    assert "outside the table" in err
+    assert "outside the atlas" in err
     assert "--solve" in err
     assert run(capsys, *system, "--gamma", 50, "--solve")[0] == 0
     assert run(capsys, "fish", "--table", tmp_path / "no.nc", "--lam", 8, "--wf", 1, "--gamma", 1)[0] == 5

@@ -2,26 +2,126 @@
 
 import importlib.metadata
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import xarray as xr
+from tqdm import tqdm
 
 from towatlas.kernels.compiling import source_hash
-from towatlas.tables.critical import SCHEMA_VERSION
+from towatlas.tables.file import SCHEMA_VERSION
 from towatlas.tables.seal import BLANK_SEAL, AtlasFileError, written_in_place
 
 COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True, "fletcher32": True}
 
 
+@dataclass(frozen=True)
+class Summary:
+    """What a finished build has to say for itself.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    title : str
+        What it holds.
+    facts : tuple of (str, str)
+        Labels and what they say, in order.
+    seconds : float
+        How long it took [s], > 0.
+    """
+
+    path: Path
+    title: str
+    facts: tuple[tuple[str, str], ...]
+    seconds: float
+
+    @property
+    def bytes(self) -> int:
+        """Size of the file [bytes]."""
+        return self.path.stat().st_size
+
+    def __str__(self) -> str:
+        facts = (*self.facts, ("time", f"{self.seconds:.1f} s"))
+        lines = [f"  {label:<12} {text}" for label, text in facts]
+        return "\n".join([f"{self.path}  ({self.bytes / 1e6:.2f} MB, {self.title})", *lines])
+
+
+@contextmanager
+def limited_threads(count: int | None) -> Iterator[None]:
+    """All parallel kernels within the block run on so many threads.
+
+    Parameters
+    ----------
+    count : int or None
+        None for all there are.
+
+    Yields
+    ------
+    None
+
+    Raises
+    ------
+    ValueError
+        For more than there are, and less than 1.
+    """
+    before = numba.get_num_threads()
+    limit = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    if count is not None:
+        if not 1 <= count <= limit:
+            raise ValueError(f"threads must be 1 to {limit} on this machine, got {count}")
+        numba.set_num_threads(count)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
+
+
+def progress_bar(total: int, unit: str, wanted: bool) -> tqdm:
+    """A bar on standard error; none where that is no terminal.
+
+    Parameters
+    ----------
+    total : int
+        What is to be done.
+    unit : str
+        Of that.
+    wanted : bool
+
+    Returns
+    -------
+    tqdm
+    """
+    return tqdm(total=total, unit=unit, disable=None if wanted else True, leave=False)
+
+
 def provenance(options: str) -> dict[str, Any]:
-    """Attributes that say with what a file was built; nothing in them depends on the machine or the hour."""
+    """Attributes that say with what a file was built; nothing in them depends on the machine or the hour.
+
+    Parameters
+    ----------
+    options : str
+        Of `towatlas build`.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    ValueError
+        If $SOURCE_DATE_EPOCH is set and no number of seconds.
+    """
     versions = " ".join(
         f"{name} {importlib.metadata.version(name)}" for name in ("numpy", "numba", "xarray", "netCDF4")
     )
-    command = f"python -m towatlas build {options}"
+    command = f"towatlas build {options}"
     attributes = {
         "schema_version": np.int32(SCHEMA_VERSION),
         "towatlas_version": importlib.metadata.version("towatlas"),
@@ -51,7 +151,21 @@ def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
 
 
 def write_atlas(path: Path, root: xr.Dataset, groups: dict[str, xr.Dataset]) -> None:
-    """Write a file, seal it and move it into place; see `towatlas.tables.seal`."""
+    """Write a file, seal it and move it into place; see `towatlas.tables.seal`.
+
+    Parameters
+    ----------
+    path : Path
+    root : xarray.Dataset
+        What stands at the top.
+    groups : dict of xarray.Dataset
+        By name.
+
+    Raises
+    ------
+    AtlasFileError
+        If it cannot be written.
+    """
     seal = xr.Variable(
         (),
         np.array(BLANK_SEAL, f"S{len(BLANK_SEAL)}"),

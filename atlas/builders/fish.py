@@ -1,7 +1,7 @@
 """Building the table of equilibria: the median branch and the outward one over (w_f, lambda, gamma)."""
 
+import os
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +10,12 @@ import xarray as xr
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from towatlas.builders.critical import limited_threads, progress_bar
-from towatlas.builders.file import provenance, write_atlas
+from towatlas.builders.file import Summary, limited_threads, progress_bar, provenance, write_atlas
 from towatlas.builders.grids import EquilibriaGrid
 from towatlas.cf import equilibria_attributes, equilibrium_variable, variable
 from towatlas.kernels import status
-from towatlas.limits import unchecked_excess_length
-from towatlas.numerics.chebyshev import W_SCALE
+from towatlas.limits import W_SCALE, unchecked_excess_length
+from towatlas.numerics.errormap import SAFETY, stated_error
 from towatlas.numerics.lagrange import interpolate, middles, windows
 from towatlas.solve.critical import solve_rows
 from towatlas.solve.members import shoot_lanes, solve_members
@@ -30,47 +29,21 @@ FIELDS = ("R_x0", "x_f", "z_f", "error", "status")
 MARGIN = 0.2
 # Beyond this error a cell is not interpolated.
 WORST_ERROR = 1e-3
-# The error of a polynomial need not peak in the middle of a cell; ROUNDING is of a table near machine accuracy.
-SAFETY = 5.0
+# Of a table near machine accuracy.
 ROUNDING = 1e-11
 
 
-@dataclass(frozen=True)
-class Summary:
-    """What a finished build has to say for itself."""
-
-    path: Path
-    ranges: str
-    equilibria: int
-    most: int
-    worst_error: float
-    interpolated: float
-    seconds: float
-    bytes: int
-
-    def __str__(self) -> str:
-        return "\n".join(
-            [
-                f"{self.path}  ({self.bytes / 1e6:.1f} MB)",
-                f"  ranges       {self.ranges}",
-                f"  equilibria   {self.equilibria}, on the median and the outward branch; at most {self.most} a cable",
-                f"  worst error  {self.worst_error:.1e} relative (estimated)",
-                f"  lookup       interpolates in {self.interpolated:.0%} of the cells of the median branch",
-                f"  time         {self.seconds:.1f} s",
-            ]
-        )
-
-
 def build_equilibria(
-    path: Path, *, grid: EquilibriaGrid | None = None, threads: int | None = None, progress: bool = True
+    path: str | os.PathLike, *, grid: EquilibriaGrid | None = None, threads: int | None = None, progress: bool = True
 ) -> Summary:
     """Build a table of equilibria and move it into place.
 
     Parameters
     ----------
-    path : Path
+    path : path
         Where the file goes; what is there stays whole until the new one is.
     grid : EquilibriaGrid, optional
+        Where it is tabulated.
     threads : int, optional
         Threads to use; all by default. The file does not depend on it.
     progress : bool
@@ -79,8 +52,16 @@ def build_equilibria(
     Returns
     -------
     Summary
+
+    Raises
+    ------
+    AtlasFileError
+        If the file cannot be written.
+    RuntimeError
+        If an equilibrium does not converge, which is a defect.
     """
     start = time.perf_counter()
+    path = Path(path)
     check_writable(path)
     grid = grid or EquilibriaGrid()
     between = _between(grid)
@@ -94,17 +75,20 @@ def build_equilibria(
         root = _plain(grid, solved)
         root.attrs = equilibria_attributes(provenance("--equilibria"))
         write_atlas(path, root, {CRITICAL: _critical_group(grid, critical), CELLS: cells})
-    return Summary(
-        path=path,
-        ranges=f"w_f 0..{grid.w_f.max():g}, lambda {grid.lam.min():g}..{grid.lam.max():g}, "
-        f"gamma {grid.gamma.min():g}..{grid.gamma.max():g}",
-        equilibria=2 * grid.size,
-        most=int(2 * solved["nodes"].max() + 1),
-        worst_error=float(solved["error"].max()),
-        interpolated=float(np.mean(cells["width"].values[1] > 0)),
-        seconds=time.perf_counter() - start,
-        bytes=path.stat().st_size,
+    facts = (
+        (
+            "ranges",
+            f"w_f 0..{grid.w_f.max():g}, lambda {grid.lam.min():g}..{grid.lam.max():g}, "
+            f"gamma {grid.gamma.min():g}..{grid.gamma.max():g}",
+        ),
+        (
+            "equilibria",
+            f"{2 * grid.size}, on the median and the outward branch; at most {2 * solved['nodes'].max() + 1} a cable",
+        ),
+        ("worst error", f"{solved['error'].max():.1e} relative (estimated)"),
+        ("lookup", f"interpolates in {np.mean(cells['width'].values[1] > 0):.0%} of the cells of the median branch"),
     )
+    return Summary(path, "equilibria", facts, time.perf_counter() - start)
 
 
 def _solve(grid: EquilibriaGrid, bar: tqdm, label: str) -> tuple[dict[str, Array], dict[str, NDArray[Any]]]:
@@ -124,11 +108,11 @@ def _critical_speeds(grid: EquilibriaGrid) -> dict[str, Array]:
     left = np.arange(len(w_f))
     n = 1
     while True:
-        excess = unchecked_excess_length(lam[left], w_f[left], n)
+        excess = unchecked_excess_length(lam=lam[left], w_f=w_f[left], n=n)
         left, excess = left[excess > 0.0], excess[excess > 0.0]
         gamma, offset = np.full(len(w_f), np.inf), np.full(len(w_f), np.nan)
         if len(left):
-            rows = solve_rows(np.full(len(left), n), w_f[left], lam[left], excess)
+            rows = solve_rows(lam=lam[left], w_f=w_f[left], n=np.full(len(left), n), excess=excess)
             known = rows["status"] == status.OK
             # Lost in rounding are only folds next to their threshold, faster than any table.
             if not (known | (rows["status"] == status.LOST_IN_ROUNDING)).all():
@@ -167,13 +151,13 @@ def _march_in_speed(grid: EquilibriaGrid, critical: dict[str, Array], bar: tqdm)
                 new = np.flatnonzero(n != nodes[1, :, j - 1])
                 guess[new] = x_fold[n[new] - 1, new]
             members = solve_members(
-                w_f[unsolved],
-                lam[unsolved],
-                np.full(len(unsolved), speed),
-                n[unsolved],
-                np.zeros(len(unsolved), bool),
-                shoot_lanes,
-                guess[unsolved] * speed**2,
+                lam=lam[unsolved],
+                w_f=w_f[unsolved],
+                gamma=np.full(len(unsolved), speed),
+                n=n[unsolved],
+                outer=np.zeros(len(unsolved), bool),
+                shoot=shoot_lanes,
+                guess=guess[unsolved] * speed**2,
             )
             for name in FIELDS:
                 branches[name][k, unsolved, j] = getattr(members, name)
@@ -194,7 +178,7 @@ def _extrapolated(x_f: Array, gamma: Array, j: int) -> Array:
 
 def _between(grid: EquilibriaGrid) -> EquilibriaGrid:
     """The middles of all cells, in the coordinates of interpolation."""
-    axes = [middles(axis) for axis in coordinates(grid.w_f, grid.lam, grid.gamma)]
+    axes = [middles(axis) for axis in coordinates(lam=grid.lam, w_f=grid.w_f, gamma=grid.gamma)]
     return EquilibriaGrid(w_f=W_SCALE * np.expm1(axes[0]), lam=np.exp(axes[1]), gamma=np.exp(axes[2]))
 
 
@@ -222,7 +206,7 @@ def _one_sheet(grid: EquilibriaGrid, gamma_c: Array, gamma_between: Array) -> tu
 
 def _cells(grid: EquilibriaGrid, solved: dict[str, Any], exact: dict[str, Any], sheets: Any) -> xr.Dataset:
     """How each cell is interpolated: the width of least error in its middle among those that stay on one branch."""
-    axes = coordinates(grid.w_f, grid.lam, grid.gamma)
+    axes = coordinates(lam=grid.lam, w_f=grid.w_f, gamma=grid.gamma)
     counts = tuple(len(axis) - 1 for axis in axes)
     cells = tuple(c.ravel() for c in np.indices(counts))
     points = tuple(middles(axis)[cell] for axis, cell in zip(axes, cells, strict=True))
@@ -240,11 +224,10 @@ def _cells(grid: EquilibriaGrid, solved: dict[str, Any], exact: dict[str, Any], 
             if k == 1:
                 low, high = _extremes(solved["nodes"][1], counts, trial)
                 usable = one_sheet & (low == high) & (low == nodes_between)
-            miss = _largest_about(np.where(usable, miss, 0.0))
+            miss = stated_error(np.where(usable, miss, 0.0), ROUNDING)
             better = usable & (miss < error[k])
             width[k][better] = trial
             error[k][better] = miss[better]
-    error = SAFETY * error + ROUNDING
     bad = error > WORST_ERROR
     width[bad], error[bad] = 0, np.nan
     dims = ("branch", "w_f_cell", "lam_cell", "gamma_cell")
@@ -274,15 +257,6 @@ def _cells(grid: EquilibriaGrid, solved: dict[str, Any], exact: dict[str, Any], 
             "neighbours.",
         },
     )
-
-
-def _largest_about(values: Array) -> Array:
-    """Largest value of each cell and its neighbours: the error of one cell alone may be small by chance."""
-    for axis in range(values.ndim):
-        moved = np.moveaxis(values, axis, 0)
-        padded = np.concatenate([moved[:1], moved, moved[-1:]])
-        values = np.moveaxis(np.max([padded[:-2], moved, padded[2:]], axis=0), 0, axis)
-    return values
 
 
 def _extremes(nodes: NDArray[Any], counts: tuple[int, ...], width: int) -> tuple[NDArray[Any], NDArray[Any]]:

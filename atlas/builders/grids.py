@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from towatlas.tables.drag_folds import DragAxes
+
 Array = NDArray[np.float64]
 
 
@@ -15,7 +17,23 @@ def _decades(low: int, high: int, per_decade: int) -> Array:
 
 @dataclass(frozen=True)
 class Grid:
-    """Where an atlas is tabulated. The defaults are those of `make atlas`."""
+    """Where an atlas is tabulated. The defaults are those of `make atlas`.
+
+    Attributes
+    ----------
+    n_max : int
+        Highest transition, >= 1.
+    w_f_max : float
+        Heaviest fish of the series [-], > 0.
+    excess_min, excess_max : float
+        Least and greatest lambda - lambda_cn of the series [-], > 0.
+    series_w_f, series_excess : int
+        Nodes of the series along each axis, >= 2.
+    error_blocks : int
+        Blocks of the error along each axis, >= 1.
+    w_f, lam : ndarray
+        Axes of the plain table [-], rising.
+    """
 
     n_max: int = 6
     w_f_max: float = 1e4
@@ -36,7 +54,13 @@ class Grid:
 
 @dataclass(frozen=True)
 class EquilibriaGrid:
-    """Where the equilibria are tabulated: more than half a million cables and speeds, two equilibria each."""
+    """Where the equilibria are tabulated: more than half a million cables and speeds, two equilibria each.
+
+    Attributes
+    ----------
+    w_f, lam, gamma : ndarray
+        Axes of the table [-], rising.
+    """
 
     w_f: Array = field(default_factory=lambda: np.concatenate([[0.0], _decades(-2, 4, 6)]))
     lam: Array = field(default_factory=lambda: _decades(-1, 2, 32))
@@ -50,7 +74,25 @@ class EquilibriaGrid:
 
 @dataclass(frozen=True)
 class ScanSettings:
-    """How finely `scan` looks. Speeds are spaced evenly in their logarithm, from just below 1/sqrt(lambda)."""
+    """How finely `scan` looks.
+
+    Attributes
+    ----------
+    speeds : int
+        Spaced evenly in their logarithm, from just below 1/sqrt(lambda).
+    guesses : int
+        Of R_x0, over the bounds of Eq. (35).
+    segments : int
+        Of a forward shot.
+    gamma_max : float
+        Highest speed [-], > 0.
+    n_max : int
+        Highest transition, >= 1.
+    tolerance : float
+        Within which a critical speed is bracketed, relative [-], > 0.
+    w_f, lam : ndarray
+        The cables [-], rising.
+    """
 
     speeds: int = 240
     guesses: int = 1024
@@ -67,7 +109,13 @@ class ScanSettings:
         return self.n_max * len(self.w_f) * len(self.lam)
 
     def attributes(self) -> dict[str, Any]:
-        """What a reader must know to judge the scan."""
+        """What a reader must know to judge the scan.
+
+        Returns
+        -------
+        dict
+            Attributes of the group.
+        """
         return {
             "speeds": self.speeds,
             "guesses": self.guesses,
@@ -82,3 +130,61 @@ class ScanSettings:
 
 # Twenty values a scan of a whole table can afford on each axis.
 WHOLE_SCAN = ScanSettings(w_f=np.concatenate([[0.0], _decades(-2, 4, 2)]), lam=_decades(0, 2, 16)[4:], guesses=512)
+
+
+def _c_grid() -> Array:
+    return np.concatenate([[0.0], 10.0 ** np.linspace(-4.0, 1.0, 41)])
+
+
+@dataclass(frozen=True)
+class DragGrid:
+    """Where folds with drag are tabulated. The defaults take a few minutes.
+
+    Attributes
+    ----------
+    n_max : int
+        Highest transition, >= 1.
+    lam_min, lam_max : float
+        Shortest and longest cable [-], > 0.
+    w_f_max : float
+        Heaviest fish [-], > 0.
+    sigma_min : float
+        Where the series end beyond the cusp [-], -1 to 0.
+    stages : tuple of (int, int)
+        Nodes in w_f and lambda of the cables traced, and of the series that follow, each predicted by the one before;
+        the last is kept.
+    series_sigma : int
+        Nodes in sigma, none of them next to the cusp at 0.
+    checks : int
+        Cables between the nodes for the error.
+    traced_checks : int
+        How many of those are traced from the vacuum.
+    error_blocks : int
+        Blocks of the error along each axis.
+    w_f, lam, C : ndarray
+        Axes of the plain tables [-].
+    """
+
+    n_max: int = 3
+    lam_min: float = 16.0
+    lam_max: float = 60.0
+    w_f_max: float = 2000.0
+    sigma_min: float = -0.5
+    stages: tuple[tuple[int, int], ...] = ((9, 4), (29, 11))
+    series_sigma: int = 15
+    checks: int = 160
+    traced_checks: int = 5
+    error_blocks: int = 6
+    w_f: Array = field(default_factory=lambda: np.concatenate([[0.0], 10.0 ** np.linspace(-1.0, 3.25, 18)]))
+    lam: Array = field(default_factory=lambda: np.geomspace(16.0, 60.0, 14))
+    C: Array = field(default_factory=_c_grid)
+
+    @property
+    def axes(self) -> DragAxes:
+        """The domain of the series."""
+        return DragAxes(self.lam_min, self.lam_max, self.w_f_max, self.sigma_min)
+
+    @property
+    def size(self) -> int:
+        """Number of cables to solve."""
+        return self.n_max * (sum(w_f * lam for w_f, lam in self.stages) + self.checks)

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from towatlas.commands.common import OK, threads
-from towatlas.tables.critical import default_path
-from towatlas.tables.fish import DEFAULT_PATH
+from towatlas.tables.file import EQUILIBRIA_PATH, default_path
 
 
 def add(commands: Any) -> None:
@@ -16,7 +15,7 @@ def add(commands: Any) -> None:
         "--out",
         type=Path,
         metavar="FILE",
-        help=f"default {default_path()}, {DEFAULT_PATH} for --equilibria, build/scan.nc for --method scan",
+        help=f"default {default_path()}, {EQUILIBRIA_PATH} for --equilibria, build/scan.nc for --method scan",
     )
     parser.add_argument(
         "--equilibria",
@@ -48,7 +47,7 @@ def _run(options: argparse.Namespace) -> int:
             raise ValueError("--method says how critical speeds are found; a table of --equilibria has one method")
         from towatlas.builders.fish import build_equilibria
 
-        print(build_equilibria(options.out or DEFAULT_PATH, **how))
+        print(build_equilibria(options.out or EQUILIBRIA_PATH, **how))
         return OK
     if options.drag:
         if options.method == "scan":

@@ -1,6 +1,7 @@
 """What the commands share: exit codes, messages, and the types of their arguments."""
 
 import argparse
+import json
 import math
 import os
 import sys
@@ -8,9 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from towatlas.kernels import notice
-from towatlas.tables.critical import default_path
+from towatlas.nomenclature import EQUILIBRIUM
+from towatlas.tables.file import default_path
 
 OK, FAILED, USAGE, OUTSIDE, NO_STATE, FILE = 0, 1, 2, 3, 4, 5
+# Of what --json prints; raised when a key changes its name or its meaning, or goes.
+JSON_SCHEMA = 2
 
 
 def number(text: str) -> float:
@@ -65,6 +69,47 @@ def threads(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of threads")
     return int(text)
+
+
+# The fluid: options, the names of their numbers in Python and what they are.
+FLUID = (
+    ("C", drag, "drag constant of the cable, (1/2) rho C_D d R / (mu + rho A)"),
+    ("m-f", weight, "mass of the fish over (mu + rho A) R; default that of its weight"),
+    ("C-f", drag, "drag constant of the fish, (1/2) rho C_Df A_f / (mu + rho A)"),
+    ("w", number, "weight of the cable, (mu - rho A) / (mu + rho A); default 1"),
+    ("C-t", drag, "tangential drag constant of the cable"),
+)
+
+
+def add_cable(parser: argparse.ArgumentParser, gamma: bool = True) -> None:
+    """The cable, its fish and its speed."""
+    parser.add_argument("--lam", type=length, required=True, metavar="LAMBDA", help=EQUILIBRIUM["lam"].long_name)
+    parser.add_argument("--wf", type=weight, required=True, metavar="W_F", help=EQUILIBRIUM["w_f"].long_name)
+    if gamma:
+        parser.add_argument("--gamma", type=speed, required=True, metavar="GAMMA", help=EQUILIBRIUM["gamma"].long_name)
+
+
+def add_fluid(parser: argparse.ArgumentParser) -> None:
+    """The fluid; a vacuum where none of these is given."""
+    for option, kind, text in FLUID:
+        parser.add_argument(f"--{option}", type=kind, metavar=option.replace("-", "_").upper(), help=text)
+
+
+def fluid(options: argparse.Namespace) -> dict[str, float]:
+    """What is given of the fluid, by its names in Python."""
+    names = (option.replace("-", "_") for option, _, _ in FLUID)
+    return {name: getattr(options, name) for name in names if getattr(options, name) is not None}
+
+
+def print_json(answer: dict[str, Any] | list[dict[str, Any]]) -> None:
+    """An object, or a list of them, each with the version of the schema."""
+    version = {"schema_version": JSON_SCHEMA}
+    print(json.dumps([version | row for row in answer] if isinstance(answer, list) else version | answer, indent=1))
+
+
+def real(value: Any) -> float | None:
+    """A number for JSON, which knows no nan."""
+    return float(value) if math.isfinite(value) else None
 
 
 def add_atlas(parser: argparse.ArgumentParser) -> None:

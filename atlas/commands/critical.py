@@ -1,8 +1,6 @@
 """`towatlas critical`: critical speeds of one cable."""
 
 import argparse
-import json
-import math
 from typing import Any
 
 import numpy as np
@@ -13,19 +11,20 @@ from towatlas.commands.common import (
     OK,
     OUTSIDE,
     add_atlas,
+    add_cable,
     drag,
-    length,
     order,
+    print_json,
+    real,
     say,
-    weight,
 )
 from towatlas.kernels import status
 from towatlas.limits import transitions, unchecked_threshold_length
-from towatlas.nomenclature import REPORT, SYMBOLS
-from towatlas.solve.critical import CriticalStates, solve_critical
+from towatlas.nomenclature import REPORT
+from towatlas.results import CriticalStates, DragFolds
+from towatlas.solve.critical import solve_critical
 from towatlas.solve.drag_folds import solve_drag_folds
-from towatlas.tables.critical import Atlas, open_atlas
-from towatlas.tables.drag_folds import open_drag
+from towatlas.tables.atlas import Atlas, open_atlas
 
 # Transitions solved at once when none is named; a cable of 1e4 tow radii has 5000.
 MOST_SOLVED = 1000
@@ -41,8 +40,7 @@ def add(commands: Any) -> None:
         description=f"Critical speeds and reactions of one cable. Dimensionless groups as in {REPORT}: "
         "gamma = Omega sqrt(R/g), lengths over the tow radius R, forces over (mu + rho A) g R.",
     )
-    parser.add_argument("--lam", type=length, required=True, metavar="LAMBDA", help=SYMBOLS["lam"].long_name)
-    parser.add_argument("--wf", type=weight, required=True, metavar="W_F", help=SYMBOLS["w_f"].long_name)
+    add_cable(parser, gamma=False)
     parser.add_argument("--n", type=order, metavar="N", help="one transition; without it every one that exists")
     parser.add_argument(
         "--C",
@@ -63,37 +61,38 @@ def _run(options: argparse.Namespace) -> int:
     lam, w_f = options.lam, options.wf
     if options.C is not None:
         return _run_drag(options)
-    existing = transitions(lam, w_f)
+    existing = transitions(lam=lam, w_f=w_f)
     atlas = None if options.solve else open_atlas(options.atlas)
-    limit = MOST_SOLVED if atlas is None else atlas.n_max
+    limit = MOST_SOLVED if atlas is None else atlas.critical.n_max
     orders = np.arange(1, min(existing, limit) + 1) if options.n is None else np.array([options.n])
     if options.n is None and existing > limit:
         remedy = "name one with --n" if options.solve else "the atlas ends there, --solve --n N solves any"
         say(f"lambda = {lam:g} has {existing} transitions; the first {limit} follow ({remedy})")
     states = solve_critical(lam, w_f, orders) if atlas is None else atlas.states(lam, w_f, orders, outside="nan")
-    print(_as_json(states) if options.json else _as_table(states), end="")
-    return _verdict(states, lam, w_f, atlas)
+    rows = _rows(states)
+    print_json(rows) if options.json else print(_as_table(rows), end="")
+    return _verdict(states, lam=lam, w_f=w_f, atlas=atlas)
 
 
 def _run_drag(options: argparse.Namespace) -> int:
     """Where pairs of equilibria appear and end with drag."""
-    existing = transitions(options.lam, options.wf)
+    existing = transitions(lam=options.lam, w_f=options.wf)
     orders = np.arange(1, min(existing, MOST_WITH_DRAG) + 1) if options.n is None else np.array([options.n])
     cable = options.lam, options.wf, options.C, orders
     if options.solve:
-        folds: Any = solve_drag_folds(*cable)
+        folds: DragFolds = solve_drag_folds(*cable)
     else:
-        folds = open_drag(options.atlas).folds(*cable, outside="nan")
+        folds = open_atlas(options.atlas).folds(*cable, outside="nan")
     words = status.FLAG_MEANINGS.split()
-    names = ("appears", "ends", "C_cusp", "error")
+    names = ("appears", "ends", "C_cusp", "error", "error_cusp")
     rows = [
         {"n": int(n)}
-        | {name: _or_none(getattr(folds, name)[k]) for name in names}
+        | {name: real(getattr(folds, name)[k]) for name in names}
         | {"status": words[int(folds.status[k])], "status_ends": words[int(folds.status_ends[k])]}
         for k, n in enumerate(orders)
     ]
     if options.json:
-        print(json.dumps(rows, indent=1))
+        print_json(rows)
     elif rows:
         print(f"{'n':>4} {'appears':>20} {'ends':>20} {'C*_n':>14} {'error':>8}  status, of ends")
         for row in rows:
@@ -112,11 +111,7 @@ def _run_drag(options: argparse.Namespace) -> int:
     return NO_STATE if not len(codes) or (codes != status.NOT_CONVERGED).any() else FAILED
 
 
-def _or_none(value: Any) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _verdict(states: CriticalStates, lam: float, w_f: float, atlas: Atlas | None) -> int:
+def _verdict(states: CriticalStates, *, lam: float, w_f: float, atlas: Atlas | None) -> int:
     """Say what could not be answered; the exit code."""
     codes = states.status
     if not len(codes) or (codes == status.NO_TRANSITION).all():
@@ -152,20 +147,15 @@ def _rows(states: CriticalStates) -> list[dict[str, Any]]:
     for k in range(len(columns["n"])):
         row: dict[str, Any] = {"n": int(columns["n"][k])}
         for name in names[1:-1]:
-            value = float(columns[name][k])
-            row[name] = value if math.isfinite(value) else None
+            row[name] = real(columns[name][k])
         row["status"] = words[int(columns["status"][k])]
         rows.append(row)
     return rows
 
 
-def _as_json(states: CriticalStates) -> str:
-    return json.dumps(_rows(states), indent=1) + "\n"
-
-
-def _as_table(states: CriticalStates) -> str:
+def _as_table(rows: list[dict[str, Any]]) -> str:
     lines = [f"{'n':>4} {'gamma':>20} {'R_x0':>20} {'x_f':>20} {'error':>8}  status"]
-    for row in _rows(states):
+    for row in rows:
         cells = " ".join(f"{'-' if row[k] is None else format(row[k], '.13g'):>20}" for k in ("gamma", "R_x0", "x_f"))
         error = "-" if row["error"] is None else format(row["error"], ".1e")
         lines.append(f"{row['n']:>4} {cells} {error:>8}  {row['status']}")

@@ -1,16 +1,15 @@
 """`towatlas design`: the cable that puts the fish at a depth."""
 
 import argparse
-import json
 import math
 from typing import Any
 
 import numpy as np
 
-from towatlas.commands.common import NO_STATE, OK, add_atlas, say
+from towatlas.commands.common import NO_STATE, OK, add_atlas, print_json, say
 from towatlas.commands.scene import add_speed, atlas_if_any, describe_speed, quantity, scene_of
-from towatlas.scene.answers import Design, design
-from towatlas.scene.models import Choice
+from towatlas.scene.choice import Choice
+from towatlas.scene.designs import Design, design
 from towatlas.scene.scene import MODELS
 from towatlas.solve.equilibria import equilibria
 
@@ -22,7 +21,7 @@ def add(commands: Any) -> None:
         help="cable lengths that put the fish of a scene at a depth",
         description="All cable lengths that put the fish at a depth below the plane of the towing circle, by the "
         "vacuum model, with the distance to the nearest critical speed. The length in the scene is not used. For each "
-        "median shape the least model says where the fish hangs with drag and buoyancy.",
+        "expected shape the least model says where the fish hangs with drag and buoyancy.",
     )
     parser.add_argument("--scene", required=True, metavar="FILE", help="a scene, or the name of one that is shipped")
     parser.add_argument("--depth", type=quantity("m"), required=True, metavar="D", help="as 120m; bare: m")
@@ -70,13 +69,13 @@ def _run(options: argparse.Namespace) -> int:
             "cables": rows,
             "reason": reason,
         }
-        print(json.dumps(answer, indent=1))
+        print_json(answer)
     elif rows:
         print(_text(found, rows))
     if reason:
         say(reason)
         return NO_STATE
-    if (warning := _warning(rows)) is not None:
+    if (warning := _warning(rows, options.model is not None)) is not None:
         say(warning)
     return OK
 
@@ -90,7 +89,7 @@ def _rows(found: Design, choices: dict[int, Choice]) -> list[dict[str, Any]]:
         row: dict[str, Any] = {
             "length_m": float(cables.lam[k] * scene.radius),
             "nodes": int(cables.nodes[k]),
-            "median": bool(found.median[k]),
+            "expected": bool(found.expected[k]),
             "x_f_m": float(cables.x_f[k] * scene.radius),
             "tension_N": float(cables.tension[k] * force),
             "nearest_n": None,
@@ -129,15 +128,20 @@ def _by_model(choice: Choice) -> dict[str, Any]:
     }
 
 
-def _warning(rows: list[dict[str, Any]]) -> str | None:
+def _warning(rows: list[dict[str, Any]], forced: bool) -> str | None:
     """What the vacuum model is worth here."""
     larger = [row for row in rows if row["by_model"] and row["by_model"]["model"] != "vacuum"]
     if not larger:
         return None
     first = larger[0]
+    if forced:
+        return (
+            f"lengths are by the vacuum model; with {first['length_m']:.6g} m the fish hangs "
+            f"{first['by_model']['z_f_m']:.6g} m deep by {first['by_model']['model']}"
+        )
     return (
         f"lengths are by the vacuum model, which does not hold for {len(larger)} of "
-        f"{sum(row['median'] for row in rows)} median shapes: with {first['length_m']:.6g} m, "
+        f"{sum(row['expected'] for row in rows)} expected shapes: with {first['length_m']:.6g} m, "
         f"{first['by_model']['reason']}"
     )
 
@@ -145,8 +149,8 @@ def _warning(rows: list[dict[str, Any]]) -> str | None:
 def _reason(found: Design) -> str:
     scene, cables = found.scene, found.cables
     if not len(cables):
-        groups = scene.groups("vacuum")
-        deepest = float(equilibria(found.longest / scene.radius, groups.w_f, groups.gamma).z_f.max()) * scene.radius
+        shapes = equilibria(found.longest / scene.radius, scene.system("vacuum").w_f, scene.gamma)
+        deepest = float(shapes.z_f.max()) * scene.radius
         return (
             f"no cable up to {found.longest:.4g} m has an equilibrium with the fish at {found.depth:.6g} m: the "
             f"deepest of the longest one is at {deepest:.6g} m; a longer one may, with --max-length, or a slower tow"
@@ -165,7 +169,7 @@ def _text(found: Design, rows: list[dict[str, Any]]) -> str:
         scene.title or scene.source,
         describe_speed(scene),
         f"fish at {found.depth:.6g} m, cables up to {found.longest:.4g} m (vacuum model); nearest jump: its number, "
-        "critical speed less the scene's; of median shapes, where the fish hangs by the least model",
+        "critical speed less the scene's; of expected shapes, where the fish hangs by the least model",
         "",
         f"{'length m':>13} {'nodes':>5} {'fish x m':>13} {'tension N':>13} {'n':>4} {'%':>8} {'gamma':>9} {'m/s':>9}",
     ]
@@ -183,5 +187,5 @@ def _text(found: Design, rows: list[dict[str, Any]]) -> str:
         if by:
             hangs = f", by {by['model']} {by['z_f_m']:.6g} m deep, {by['nodes']} nodes"
             hangs = ", the vacuum model holds" if by["model"] == "vacuum" else hangs
-        lines.append(cells + jump + (f"  median{hangs}" if row["median"] else ""))
+        lines.append(cells + jump + (f"  expected{hangs}" if row["expected"] else ""))
     return "\n".join(lines)

@@ -1,14 +1,14 @@
 """`towatlas fish`: where the fish is, from a table of equilibria."""
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
-from towatlas.commands.common import FAILED, NO_STATE, OK, OUTSIDE, length, say, speed, weight
+from towatlas.commands.common import FAILED, NO_STATE, OK, OUTSIDE, add_cable, print_json, say
 from towatlas.kernels import status
-from towatlas.nomenclature import EQUILIBRIUM
-from towatlas.tables.fish import BRANCHES, DEFAULT_PATH, open_equilibria
+from towatlas.tables.atlas import open_atlas
+from towatlas.tables.file import EQUILIBRIA_PATH
+from towatlas.tables.fish import BRANCHES
 
 
 def add(commands: Any) -> None:
@@ -19,18 +19,16 @@ def add(commands: Any) -> None:
         description="Position of the fish on the median and on the outward branch, from a table built with `towatlas "
         "build --equilibria`. Next to a critical speed, where the table is not interpolated, it is solved directly.",
     )
-    parser.add_argument("--lam", type=length, required=True, metavar="LAMBDA", help=EQUILIBRIUM["lam"].long_name)
-    parser.add_argument("--wf", type=weight, required=True, metavar="W_F", help=EQUILIBRIUM["w_f"].long_name)
-    parser.add_argument("--gamma", type=speed, required=True, metavar="GAMMA", help=EQUILIBRIUM["gamma"].long_name)
+    add_cable(parser)
     parser.add_argument("--branch", choices=BRANCHES, help="one branch; without it both")
-    parser.add_argument("--table", type=Path, default=DEFAULT_PATH, metavar="FILE", help="default %(default)s")
+    parser.add_argument("--table", type=Path, default=EQUILIBRIA_PATH, metavar="FILE", help="default %(default)s")
     parser.add_argument("--solve", action="store_true", help="solve directly what lies outside the table")
     parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
-    table = open_equilibria(options.table)
+    table = open_atlas(options.table)
     rows = []
     worst = OK
     for branch in (options.branch,) if options.branch else BRANCHES[::-1]:
@@ -49,7 +47,7 @@ def _run(options: argparse.Namespace) -> int:
         row |= {name: float(getattr(at, name)) for name in ("x_f", "z_f", "error")}
         rows.append(row | {"interpolated": bool(at.interpolated)})
     if options.json:
-        print(json.dumps(rows, indent=1))
+        print_json(rows)
         return worst
     print(f"{'branch':>8} {'nodes':>5} {'x_f':>20} {'z_f':>20} {'error':>8}  source")
     for row in rows:

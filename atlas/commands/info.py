@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from towatlas.commands.common import OK
-from towatlas.nomenclature import EQUILIBRIA
-from towatlas.tables.critical import default_path, open_atlas, read_root
-from towatlas.tables.fish import open_equilibria
+from towatlas.tables.atlas import Atlas
+from towatlas.tables.file import default_path, read_root
 
 
 def add(commands: Any) -> None:
@@ -23,18 +22,16 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     attributes, _, seal = read_root(options.file)
-    print(f"{'file':<40}  {options.file}")
-    if attributes.get("method") == "fold":
-        atlas = open_atlas(options.file)
-        axes = atlas.axes
-        print(f"{'n':<40}  1 .. {atlas.n_max}")
-        print(f"{'w_f':<40}  0 .. {axes.w_f_max:g}")
-        print(f"{'lam - lambda_c':<40}  {axes.excess_min:g} .. {axes.excess_max:g}")
-    elif attributes.get("method") == EQUILIBRIA:
-        for name, nodes in open_equilibria(options.file).grid.items():
-            print(f"{name:<40}  {nodes[0]:g} .. {nodes[-1]:g}")
+    rows = {"file": str(options.file)}
+    if attributes.get("method") != "scan":
+        atlas = Atlas(options.file)
+        rows["holds"] = ", ".join(atlas.holds)
+        for part in atlas.parts:
+            rows |= part.domain()
     for name in sorted(attributes):
         value = attributes[name]
-        print(f"{name:<40}  {format(value, '.2g') if isinstance(value, float) else value}")
-    print(f"{'seal (SHA-256 of the file but the seal)':<40}  {seal}")
+        rows[name] = format(value, ".2g") if isinstance(value, float) else str(value)
+    rows["seal (SHA-256 of the file but the seal)"] = seal
+    for name, text in rows.items():
+        print(f"{name:<40}  {text}")
     return OK

@@ -5,12 +5,14 @@ from pathlib import Path
 from typing import Any
 
 from towatlas.commands.common import FIGURE_FORMATS, OK, add_atlas, new_figure, save_figure
-from towatlas.tables.critical import open_atlas
+from towatlas.tables.atlas import open_atlas
 
 
 def add(commands: Any) -> None:
     """Declare the command."""
-    parser = commands.add_parser("plot", help="draw a figure", description="Draw a figure, `critical` from an atlas.")
+    parser = commands.add_parser(
+        "plot", help="draw a figure", description="Draw a figure: `critical` from an atlas, `drag` solved."
+    )
     parser.add_argument(
         "figure",
         choices=("critical", "drag"),

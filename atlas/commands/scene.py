@@ -1,24 +1,31 @@
 """`towatlas scene`: a towing scene in real units."""
 
 import argparse
-import json
 import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from towatlas.commands.common import OK, add_atlas, say
+from towatlas.commands.common import OK, add_atlas, print_json, real, say
 from towatlas.commands.common import speed as dimensionless_speed
 from towatlas.kernels import status
-from towatlas.scene.answers import Jumps, SceneAnswer, answer_scene
+from towatlas.scene.choice import Choice, percent
 from towatlas.scene.file import read_scene, shipped_scenes
-from towatlas.scene.models import QUESTIONS, Choice, check_questions, percent
+from towatlas.scene.jumps import Jumps, SceneAnswer, answer_scene
+from towatlas.scene.models import QUESTIONS, check_questions
 from towatlas.scene.scene import KNOT, MODELS, Scene
-from towatlas.solve.drag_equilibria import DragEquilibria
-from towatlas.tables.critical import Atlas, open_atlas
+from towatlas.tables.atlas import Atlas, open_atlas
 
 MEDIA = {"vacuum": "a vacuum", "air": "a nondense fluid", "water": "a dense fluid"}
-DRAG_COLUMNS = ("r_f_m", "x_f_m", "y_f_m", "z_f_m", "lag_deg", "tension_N")
+# Of an equilibrium: names in JSON, and what the table calls them.
+COLUMNS = {
+    "x_f_m": "x_f",
+    "y_f_m": "y_f",
+    "z_f_m": "z_f",
+    "lag_deg": "lag_deg",
+    "tension_N": "tension",
+    "R_x0_N": "R_x0",
+}
 
 
 def add(commands: Any) -> None:
@@ -96,21 +103,11 @@ def atlas_if_any(path: Path) -> Atlas | None:
 def _run(options: argparse.Namespace) -> int:
     scene = scene_of(options.file, options)
     atlas = atlas_if_any(options.atlas)
-    answer = answer_scene(
-        scene,
-        atlas,
-        options.model,
-        options.asked,
-    )
-    print(json.dumps(_object(answer), indent=1) if options.json else text_of(answer))
+    answer = answer_scene(scene, atlas, options.model, options.asked)
+    print_json(_object(answer)) if options.json else print(text_of(answer))
     for code in {int(code) for code in answer.jumps.status} - {status.OK}:
         say(f"a critical speed could not be had: {status.SENTENCES[code]}")
     return OK
-
-
-def real(value: Any) -> float | None:
-    """A number for JSON, which knows no nan."""
-    return float(value) if math.isfinite(value) else None
 
 
 def speeds(scene: Scene, gamma: float) -> dict[str, float | None]:
@@ -121,7 +118,7 @@ def speeds(scene: Scene, gamma: float) -> dict[str, float | None]:
 
 
 def _groups(scene: Scene, model: str) -> dict[str, float | None]:
-    return {name: real(value) for name, value in asdict(scene.groups(model)).items()}
+    return {name: real(value) for name, value in (asdict(scene.system(model)) | {"gamma": scene.gamma}).items()}
 
 
 def _jumps(scene: Scene, jumps: Jumps) -> list[dict[str, Any]]:
@@ -145,52 +142,39 @@ def _equilibria(answer: SceneAnswer) -> list[dict[str, Any]]:
     force = scene.force_unit(answer.choice.model)
     rows = []
     for k in range(len(found)):
-        row: dict[str, Any] = {"nodes": int(found.nodes[k])}
-        if isinstance(found, DragEquilibria):
-            row |= {
-                "near_axis": bool(found.near_axis[k]),
-                "r_f_m": float(found.r_f[k] * scene.radius),
-                "lag_deg": math.degrees(found.lag[k]),
-                "y_f_m": float(found.y_f[k] * scene.radius),
-                "R_y0_N": float(found.R_y0[k] * force),
-                "R_z0_N": float(found.R_z0[k] * force),
-            }
-        else:
-            row["median"] = bool(found.median[k])
-        row |= {
-            "x_f_m": float(found.x_f[k] * scene.radius),
-            "z_f_m": float(found.z_f[k] * scene.radius),
-            "tension_N": float(found.tension[k] * force),
-            "R_x0_N": float(found.R_x0[k] * force),
-            "R_x0": float(found.R_x0[k]),
-        }
+        row: dict[str, Any] = {"branch": str(found.branch[k]), "nodes": int(found.nodes[k])}
+        row["expected"] = k == found.expected
+        row |= {f"{name}_m": float(getattr(found, name)[k] * scene.radius) for name in ("r_f", "x_f", "y_f", "z_f")}
+        row["lag_deg"] = math.degrees(found.lag[k])
+        row["tension_N"] = float(found.tension[k] * force)
+        row |= {f"{name}_N": float(getattr(found, name)[k] * force) for name in ("R_x0", "R_y0", "R_z0")}
+        row["R_x0"] = float(found.R_x0[k])
         rows.append(row)
     return rows
 
 
-def _folds(answer: SceneAnswer) -> list[dict[str, Any]]:
-    """Of the model used, where it has drag."""
-    scene, folds = answer.scene, answer.choice.answer.folds
+def _pairs(answer: SceneAnswer) -> list[dict[str, Any]]:
+    """Critical speeds of the model used, where it has drag."""
+    scene, pairs = answer.scene, answer.choice.answer.speeds
     if answer.choice.model == "vacuum":
         return []
+    words = status.FLAG_MEANINGS.split()
     return [
         {
-            "n": int(folds.n[k]),
-            "appears": _where(scene, float(folds.appears[k])),
-            "ends": _where(scene, float(folds.ends[k])),
-            "C_cusp": real(folds.C_cusp[k]),
+            "n": int(pairs.n[k]),
+            "appears": speeds(scene, float(pairs.appears[k])),
+            "ends": speeds(scene, float(pairs.ends[k])),
+            "C_cusp": real(pairs.C_cusp[k]),
+            "status": words[int(pairs.status[k])],
+            "status_ends": words[int(pairs.status_ends[k])],
         }
-        for k in range(len(folds.n))
+        for k in range(len(pairs.n))
     ]
-
-
-def _where(scene: Scene, gamma: float) -> dict[str, float | None] | str:
-    """A critical speed in every unit, or a word: it does not exist, or is not known."""
-    return speeds(scene, gamma) if math.isfinite(gamma) else "never" if gamma == math.inf else "not_known"
 
 
 def _differences(choice: Choice) -> list[dict[str, Any]]:
     # Whole numbers and speeds that do not exist have no relative difference.
+    words = status.FLAG_MEANINGS.split()
     return [
         {
             "smaller": d.smaller,
@@ -202,6 +186,8 @@ def _differences(choice: Choice) -> list[dict[str, Any]]:
             "by_larger": real(d.by_larger),
             "relative_difference": real(d.relative),
             "agrees": d.agrees,
+            "status_smaller": words[d.status_smaller],
+            "status_larger": words[d.status_larger],
         }
         for d in choice.differences
     ]
@@ -225,9 +211,9 @@ def _object(answer: SceneAnswer) -> dict[str, Any]:
         "transitions": answer.jumps.existing,
         "critical_speeds_model": "vacuum",
         "critical_speeds": _jumps(scene, answer.jumps),
-        "critical_speeds_with_drag": _folds(answer),
+        "critical_speeds_with_drag": _pairs(answer),
         "equilibria": _equilibria(answer),
-        "searched": answer.equilibria.searched if isinstance(answer.equilibria, DragEquilibria) else None,
+        "searched": answer.equilibria.searched,
     }
 
 
@@ -253,16 +239,13 @@ def text_of(answer: SceneAnswer) -> str:
     for name in by_model["vacuum"]:
         lines.append(f"{name:<8}" + "".join(f" {_cell(by_model[model][name]):>12}" for model in MODELS))
     lines += ["", *_model_lines(answer.choice), "", *_jump_lines(answer), ""]
-    if _folds(answer):
-        lines += [*_fold_lines(answer), ""]
-    lines.append(f"equilibria ({answer.choice.model} model), the fish in m, forces in N")
-    rows = _equilibria(answer)
-    columns = ("x_f_m", "z_f_m", "tension_N", "R_x0_N") if "median" in rows[0] else DRAG_COLUMNS
-    lines.append(f"{'nodes':>5} " + " ".join(f"{name.removesuffix('_m').removesuffix('_N'):>13}" for name in columns))
-    for row in rows:
-        cells = " ".join(f"{_cell(row[name], 8):>13}" for name in columns)
-        mark = "  median" if row.get("median") else "  near axis" if row.get("near_axis") else ""
-        lines.append(f"{row['nodes']:>5} {cells}{mark}")
+    if _pairs(answer):
+        lines += [*_pair_lines(answer), ""]
+    lines.append(f"equilibria ({answer.choice.model} model), the fish in m, forces in N, its lag behind the tow point")
+    lines.append(f"{'branch':>8} {'nodes':>5} " + " ".join(f"{name:>13}" for name in COLUMNS.values()))
+    for row in _equilibria(answer):
+        cells = " ".join(f"{_cell(row[name], 8):>13}" for name in COLUMNS)
+        lines.append(f"{row['branch']:>8} {row['nodes']:>5} {cells}{'  expected' if row['expected'] else ''}")
     return "\n".join(lines)
 
 
@@ -274,7 +257,7 @@ def _model_lines(choice: Choice) -> list[str]:
             f"{'model':<7} {'against':<7} {'in':<22} {'by it':>10} {'by larger':>10} {'unit':<4} {'differ':>8}"
         )
     for d in choice.differences:
-        by_it, by_larger = ("none" if v == math.inf else _cell(real(v), 5) for v in (d.by_smaller, d.by_larger))
+        by_it, by_larger = d.values("{:.5g}")
         apart = percent(d.relative) if math.isfinite(d.relative) else "-"
         lines.append(
             f"{d.smaller:<7} {d.larger:<7} {d.quantity:<22} {by_it:>10} {by_larger:>10} {d.unit:<4} {apart:>8}"
@@ -283,14 +266,15 @@ def _model_lines(choice: Choice) -> list[str]:
     return lines
 
 
-def _fold_lines(answer: SceneAnswer) -> list[str]:
+def _pair_lines(answer: SceneAnswer) -> list[str]:
     """Critical speeds with drag."""
     lines = [f"critical speeds ({answer.choice.model} model) of the last pair passed and the next, m/s"]
     lines.append(f"{'n':>5} {'appears':>13} {'ends':>13} {'C':>13} {'gone above':>13}")
-    drag = answer.choice.answer.groups.C
-    for row in _folds(answer):
+    drag = answer.choice.answer.system.C
+    for row in _pairs(answer):
         cells = [
-            where if isinstance(where, str) else _cell(where["speed_m_s"], 8) for where in (row["appears"], row["ends"])
+            row[code] if row[name]["speed_m_s"] is None else _cell(row[name]["speed_m_s"], 8)
+            for name, code in (("appears", "status"), ("ends", "status_ends"))
         ]
         cells += [_cell(drag, 6), _cell(row["C_cusp"], 6)]
         lines.append(f"{row['n']:>5} " + " ".join(f"{cell:>13}" for cell in cells))

@@ -10,19 +10,19 @@ import numpy as np
 from towatlas.commands.common import (
     FIGURE_FORMATS,
     OK,
-    length,
+    add_cable,
+    add_fluid,
+    fluid,
     new_figure,
     number,
     save_figure,
     say,
-    speed,
-    weight,
 )
-from towatlas.nomenclature import EQUILIBRIUM
+from towatlas.kernels.system import COLUMNS as SYSTEM
 from towatlas.solve.shapes import POINTS, shape
 
 FORMATS = (".nc", ".csv", *FIGURE_FORMATS)
-COLUMNS = ("s", "x", "z", "R_x", "R_z", "T")
+COLUMNS = ("s", "x", "y", "z", "R_x", "R_y", "R_z", "T")
 
 
 def add(commands: Any) -> None:
@@ -33,14 +33,14 @@ def add(commands: Any) -> None:
         description="Position, force and tension along the cable in one of its equilibria: as a table on standard "
         "output, or as a file or a figure.",
     )
-    parser.add_argument("--lam", type=length, required=True, metavar="LAMBDA", help=EQUILIBRIUM["lam"].long_name)
-    parser.add_argument("--wf", type=weight, required=True, metavar="W_F", help=EQUILIBRIUM["w_f"].long_name)
-    parser.add_argument("--gamma", type=speed, required=True, metavar="GAMMA", help=EQUILIBRIUM["gamma"].long_name)
+    add_cable(parser)
+    add_fluid(parser)
     parser.add_argument(
         "--root",
-        default="median",
+        default="expected",
         metavar="ROOT",
-        help="median (the default), outward, or a row of `towatlas equilibria`, counted from 0",
+        help="expected (the default), in a vacuum median, the name of a branch of `towatlas equilibria` as outward or "
+        "'2 inner', or a row of that list, counted from 0",
     )
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--points", type=int, default=POINTS, metavar="N", help="evenly spaced, default %(default)s")
@@ -56,7 +56,7 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueError(f"--points {options.points}: a shape has two points or more")
     root = int(options.root) if options.root.isdecimal() else options.root
     arc = options.s if options.s else np.linspace(0.0, options.lam, options.points)
-    curve = shape(options.lam, options.wf, options.gamma, root=root, s=arc)
+    curve = shape(options.lam, options.wf, options.gamma, root=root, s=arc, **fluid(options))
     kind = options.out.suffix.lower() if options.out else ".csv"
     if kind == ".nc":
         from towatlas.builders.file import write_atlas
@@ -65,7 +65,7 @@ def _run(options: argparse.Namespace) -> int:
     elif kind == ".csv":
         _write_csv(curve, options.out)
     else:
-        from towatlas.plot.critical import plot_shape
+        from towatlas.plot.shape import plot_shape
 
         figure, axes = new_figure(5.2, 6.4, "compressed")
         plot_shape(curve, axes)
@@ -77,9 +77,10 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _write_csv(curve: Any, path: Path | None) -> None:
-    facts = ", ".join(f"{name} = {curve.attrs[name]!r}" for name in ("lam", "w_f", "gamma", "R_x0"))
+    named = ("lam", "w_f", "gamma", "R_x0", *(name for name in SYSTEM if name not in ("lam", "w_f")))
+    facts = ", ".join(f"{name} = {curve.attrs[name]!r}" for name in named)
     rows = np.stack([curve[name].values for name in COLUMNS], axis=1)
-    header = f"# {facts}, nodes = {curve.attrs['nodes']}\n{','.join(COLUMNS)}"
+    header = f"# {facts}, branch = {curve.attrs['branch']}, nodes = {curve.attrs['nodes']}\n{','.join(COLUMNS)}"
     if path:
         path.parent.mkdir(parents=True, exist_ok=True)
     np.savetxt(path or sys.stdout, rows, fmt="%.17g", delimiter=",", header=header, comments="")

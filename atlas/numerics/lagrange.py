@@ -10,17 +10,52 @@ BLOCK = 2048
 
 
 def middles(nodes: Array) -> Array:
-    """The middle of each cell of an axis."""
+    """The middle of each cell of an axis.
+
+    Parameters
+    ----------
+    nodes : ndarray, shape (nodes,)
+
+    Returns
+    -------
+    ndarray, shape (nodes - 1,)
+    """
     return 0.5 * (nodes[1:] + nodes[:-1])
 
 
 def windows(cells: Integers, nodes: int, width: int) -> Integers:
-    """First of the `width` nodes about each cell: as many on either side, or the outermost at the ends of the axis."""
+    """First of the nodes about each cell: as many on either side, or the outermost at the ends of the axis.
+
+    Parameters
+    ----------
+    cells : ndarray of int, shape (cells,)
+    nodes : int
+        Of the axis.
+    width : int
+        How many about a cell, even.
+
+    Returns
+    -------
+    ndarray of int, shape (cells,)
+    """
     return np.clip(cells - (width // 2 - 1), 0, nodes - width)
 
 
 def weights(x: Array, nodes: Array, first: Integers, width: int) -> Array:
-    """Lagrange weights at x of nodes first..first+width-1, shape (len(x), width)."""
+    """Lagrange weights of nodes first..first+width-1.
+
+    Parameters
+    ----------
+    x : ndarray, shape (points,)
+    nodes : ndarray, shape (nodes,)
+    first : ndarray of int, shape (points,)
+        From `windows`.
+    width : int
+
+    Returns
+    -------
+    ndarray, shape (points, width)
+    """
     about = nodes[first[:, None] + np.arange(width)]
     result = np.ones((len(x), width))
     for k in range(width):

@@ -1,19 +1,15 @@
-"""Figures. Each function draws on the axes given, or on new ones, and returns the artists that carry data."""
+"""The figure of critical speeds against cable length."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 
 from towatlas.limits import long_cable, massless_cable, unchecked_excess_length, unchecked_threshold_length
-from towatlas.nomenclature import EQUILIBRIUM, SYMBOLS
-from towatlas.tables.critical import Atlas
-
-if TYPE_CHECKING:
-    import xarray
+from towatlas.nomenclature import SYMBOLS
+from towatlas.tables.atlas import Atlas
 
 # Dark to light, so that they differ in grey too, and told apart by dashes besides (Okabe and Ito's safe colours).
 STYLES: tuple[dict[str, Any], ...] = (
@@ -22,8 +18,6 @@ STYLES: tuple[dict[str, Any], ...] = (
     {"color": "#D55E00", "linestyle": (0, (4, 1.5, 1, 1.5))},
     {"color": "#E69F00", "linestyle": (0, (1.5, 1.5))},
 )
-# Least width of the drawing of a slender cable, as a share of its height.
-SLENDER = 0.3
 LIMIT: dict[str, Any] = {"color": "0.55", "linewidth": 0.9, "zorder": 1}
 
 
@@ -50,6 +44,11 @@ def plot_critical(
     -------
     list of Line2D
         One curve for each order and weight, orders outermost.
+
+    Raises
+    ------
+    ValueError
+        For more weights than can be told apart.
     """
     if len(w_f) > len(STYLES):
         raise ValueError(f"at most {len(STYLES)} fish weights can be told apart, got {len(w_f)}")
@@ -59,7 +58,7 @@ def plot_critical(
     curves = []
     for n in orders:
         for weight, style in zip(w_f, STYLES, strict=False):
-            excess = np.geomspace(atlas.axes.excess_min, atlas.axes.excess_max, 600)
+            excess = np.geomspace(atlas.critical.axes.excess.low, atlas.critical.axes.excess.high, 600)
             lam = unchecked_threshold_length(weight, n) + excess
             inside = lam <= 1000.0
             gamma = atlas.critical_speed(lam[inside], weight, n)
@@ -87,7 +86,7 @@ def _draw_limits(ax: Axes, orders: tuple[int, ...]) -> None:
                 label="threshold $2n$, no fish",
             )
         ]
-        far = lam[unchecked_excess_length(lam, 0.0, n) > 6.0 * n]
+        far = lam[unchecked_excess_length(lam=lam, w_f=0.0, n=n) > 6.0 * n]
         chain = np.sqrt(float(long_cable(n)) / far)
         handles += ax.plot(far, chain, **LIMIT, label=r"hanging chain, no fish: $j_{0,n}/(2\sqrt{\lambda})$")
     massless = r"massless cable, $n = 1$: $(\lambda^{2/3} - 1)^{-3/4}$"
@@ -109,58 +108,3 @@ def _label_orders(ax: Axes, atlas: Atlas, orders: tuple[int, ...], w_f: tuple[fl
                     f"$n = {n}$", (1000.0, gamma), (4, 0), textcoords="offset points", va="center", color=style["color"]
                 )
                 named.append(gamma)
-
-
-def plot_shape(curve: "xarray.Dataset", ax: Axes | None = None) -> LineCollection:
-    """The shape of one equilibrium in true proportions, coloured by its tension, with its nodes marked.
-
-    Parameters
-    ----------
-    curve : xarray.Dataset
-        From `towatlas.shape`.
-    ax : Axes, optional
-        Axes to draw on; new ones by default.
-
-    Returns
-    -------
-    LineCollection
-        The cable.
-    """
-    if ax is None:
-        _, ax = plt.subplots(figsize=(5.2, 6.4), layout="compressed")
-    x, z, tension = curve.x.values, curve.z.values, curve["T"].values
-    points = np.stack([x, z], axis=1)
-    cable = LineCollection(
-        list(np.stack([points[:-1], points[1:]], axis=1)),
-        array=0.5 * (tension[1:] + tension[:-1]),
-        cmap="viridis_r",
-        linewidth=2.2,
-        capstyle="round",
-    )
-    ax.axvline(0.0, **LIMIT, linestyle=(0, (8, 3, 2, 3)))
-    ax.add_collection(cable)
-    ax.plot(x[0], z[0], marker="v", color="k", markersize=8, linestyle="none", label="tow point", zorder=4)
-    fish = "fish" if curve.attrs["w_f"] > 0 else "end of the cable"
-    ax.plot(x[-1], z[-1], marker="o", color="k", markersize=10, linestyle="none", label=fish, zorder=4)
-    if curve.attrs["nodes"]:
-        nodes = curve.z_node.values
-        style: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": "k", "markersize": 5, "linestyle": "none"}
-        # Above the fish, which hides a node next to it.
-        ax.plot(0.0 * nodes, nodes, label="node", zorder=5, **style)
-    low, high = min(0.0, x.min()), max(0.0, x.max())
-    width = 1.12 * max(high - low, SLENDER * (z.max() - z.min()))
-    middle = 0.5 * (low + high)
-    ax.set(xlim=(middle - 0.5 * width, middle + 0.5 * width), ylim=(z.max() + 0.04 * width, z.min() - 0.04 * width))
-    ax.set_aspect("equal")
-    ax.margins(0.05)
-    ax.set_xlabel(f"radius  {EQUILIBRIUM['x'].tex}  (tow radii)")
-    ax.set_ylabel(f"depth  {EQUILIBRIUM['z'].tex}  (tow radii)")
-    ax.set_title(
-        f"{EQUILIBRIUM['lam'].tex} = {curve.attrs['lam']:g},  {EQUILIBRIUM['w_f'].tex} = {curve.attrs['w_f']:g},  "
-        rf"$\gamma$ = {curve.attrs['gamma']:g}",
-        fontsize=10,
-    )
-    bar = ax.figure.colorbar(cable, ax=ax, shrink=0.7)
-    bar.set_label(r"tension  $T$ over $(\mu + \rho A) g R$")
-    ax.legend(loc="upper left", bbox_to_anchor=(0.0, -0.12), ncols=3, frameon=False, fontsize=9)
-    return cable

@@ -1,5 +1,7 @@
 """The figure of how drag closes the jumps."""
 
+from typing import Any
+
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,7 +10,8 @@ from matplotlib.lines import Line2D
 from towatlas.kernels import status
 from towatlas.limits import unchecked_excess_length
 from towatlas.nomenclature import DRAG
-from towatlas.solve.drag_folds import Curve, between, cusp_index, solve_cusps, trace_folds
+from towatlas.numerics.curves import Curve
+from towatlas.solve.drag_folds import solve_cusps, trace_folds
 
 COLOURS = ("#000000", "#0072B2", "#D55E00", "#E69F00", "#009E73", "#CC79A7")
 GAMMA_SHOWN = 12.0
@@ -36,13 +39,20 @@ def plot_drag_folds(
     -------
     list of Line2D
         Two curves for each order drawn, where the pair appears and where it ends.
+
+    Raises
+    ------
+    ValueError
+        If the cable has none of the transitions, or there are too many.
+    ArithmeticError
+        If a curve of folds cannot be followed.
     """
-    n = np.array([k for k in orders if unchecked_excess_length(lam, w_f, k) > 0.0], dtype=np.int64)
+    n = np.array([k for k in orders if unchecked_excess_length(lam=lam, w_f=w_f, n=k) > 0.0], dtype=np.int64)
     if not 0 < len(n) <= len(COLOURS):
         raise ValueError(f"lam = {lam:g}, w_f = {w_f:g} has none of the transitions {orders}, or there are too many")
-    columns = np.full(len(n), lam), np.full(len(n), w_f)
-    curves = trace_folds(n, *columns)
-    cusps, codes = solve_cusps(curves, *columns)
+    columns: dict[str, Any] = {"lam": np.full(len(n), lam), "w_f": np.full(len(n), w_f)}
+    curves, traced = trace_folds(**columns, n=n)
+    cusps, codes = solve_cusps(curves, traced, **columns)
     if ax is None:
         _, ax = plt.subplots(figsize=(7.2, 4.8), layout="constrained")
     lines = []
@@ -73,9 +83,6 @@ def plot_drag_folds(
 def _smooth(curve: Curve) -> tuple[np.ndarray, int]:
     """A curve on more points, and which of them is the last before its cusp."""
     shares = np.arange(FINE) / FINE
-    points = [between(curve, k, share) for k in range(len(curve.points) - 1) for share in shares]
-    last = cusp_index(curve)
-    if last < 0:
-        return np.array(points), len(points) - 1
-    a, b = curve.curvatures[last], curve.curvatures[last + 1]
-    return np.array(points), FINE * last + round(FINE * float(a / (a - b)))
+    points = [curve.between(k, share) for k in range(len(curve) - 1) for share in shares]
+    last = curve.event()
+    return np.array(points), len(points) - 1 if last < 0 else FINE * last + round(FINE * curve.share(last))

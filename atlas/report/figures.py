@@ -16,7 +16,8 @@ from towatlas.limits import threshold_length
 from towatlas.nomenclature import EQUILIBRIUM, SYMBOLS
 from towatlas.plot.critical import LIMIT, STYLES
 from towatlas.report.published import SEGMENTS
-from towatlas.solve.equilibria import Equilibria, vacuum_equilibria
+from towatlas.results import Equilibria
+from towatlas.solve.equilibria import equilibria
 from towatlas.solve.shapes import shape
 
 Array = NDArray[np.float64]
@@ -31,7 +32,15 @@ ROOT: dict[str, Any] = {"marker": "o", "mfc": "white", "mew": 1.2, "markersize":
 
 @dataclass(frozen=True)
 class Cable:
-    """A cable at one speed, and what the report calls its curve."""
+    """A cable at one speed.
+
+    Attributes
+    ----------
+    lam, w_f, gamma : float
+        Cable length, fish weight and speed [-].
+    name : str
+        What the report calls its curve; empty for none.
+    """
 
     lam: float
     w_f: float
@@ -40,24 +49,42 @@ class Cable:
 
     @cached_property
     def equilibria(self) -> Equilibria:
-        return vacuum_equilibria(self.lam, self.w_f, self.gamma)
+        """All equilibria."""
+        return equilibria(self.lam, self.w_f, self.gamma)
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Lower and upper bound of R_x0, Eq. (35)."""
-        low, high = reaction_bounds(self.w_f, self.lam)
+        low, high = reaction_bounds(self.lam, self.w_f)
         return low * self.gamma**2, high * self.gamma**2
 
     def boundary_errors(self, r_x0: Array, segments: int) -> Array:
-        """E of Eq. (33) for each R_x0, shape (guesses,), by fourth-order Runge-Kutta."""
+        """E of Eq. (33) for each R_x0, by fourth-order Runge-Kutta.
+
+        Parameters
+        ----------
+        r_x0 : ndarray, shape (guesses,)
+            Over (mu + rho A) g R [-].
+        segments : int
+            Of a forward shot.
+
+        Returns
+        -------
+        ndarray, shape (guesses,)
+        """
         rows = len(r_x0)
-        cable = (np.full(rows, value) for value in (self.w_f, self.lam, self.gamma))
+        cable = (np.full(rows, value) for value in (self.lam, self.w_f, self.gamma))
         errors, x_end, r_x_end = np.empty(rows), np.empty(rows), np.empty(rows)
         forward_shots(*cable, np.ascontiguousarray(r_x0), segments, errors, x_end, r_x_end, 0, rows)
         return errors
 
     def samples(self) -> Array:
-        """R_x0 from bound to bound: evenly spaced, and closer about the roots that share a sliver of the range."""
+        """R_x0 from bound to bound: evenly spaced, and closer about the roots that share a sliver of the range.
+
+        Returns
+        -------
+        ndarray, shape (samples,)
+        """
         low, high = self.bounds
         inner = self.equilibria.R_x0[1:-1]
         even = np.linspace(low, high, SAMPLES)
@@ -72,7 +99,18 @@ class Cable:
 def root_names(found: Equilibria) -> list[str]:
     """Superscript that the report gives each root: a without nodes, b with one, d with two; left or right of its pair.
 
-    >>> root_names(vacuum_equilibria(10.0, 0.0, 1.0))
+    Parameters
+    ----------
+    found : Equilibria
+        Of up to two nodes.
+
+    Returns
+    -------
+    list of str
+
+    Examples
+    --------
+    >>> root_names(equilibria(10.0, 0.0, 1.0))
     ['bl', 'br', 'a']
     """
     names = []
@@ -96,13 +134,31 @@ FIG_16 = tuple(Cable(37.8, 1352.0, gamma) for gamma in (1.64, 2.97, 5.94))
 
 @dataclass(frozen=True)
 class Window:
-    """A part of a solution curve drawn larger: where in the axes (left, bottom, width, height), and what it shows."""
+    """A part of a solution curve drawn larger.
+
+    Attributes
+    ----------
+    place : tuple of four float
+        Where in the axes: left, bottom, width, height, as shares of them.
+    r_x0, errors : tuple of two float
+        What it shows: R_x0 and E [-], from and to.
+    """
 
     place: tuple[float, float, float, float]
     r_x0: tuple[float, float]
     errors: tuple[float, float]
 
     def holds(self, r_x0: float) -> bool:
+        """Whether it shows a root.
+
+        Parameters
+        ----------
+        r_x0 : float
+
+        Returns
+        -------
+        bool
+        """
         return self.r_x0[0] < r_x0 < self.r_x0[1]
 
 
@@ -134,7 +190,14 @@ SIZES = {
 def coarse_gap(
     cables: tuple[Cable, ...], windows: tuple[Window, ...], segments: int = SEGMENTS
 ) -> tuple[float, Cable, float]:
-    """How far curves of other segments, the report's 100, lie from those drawn, in the axes and in the windows.
+    """How far curves of other segments lie from those drawn, in the axes and in the windows.
+
+    Parameters
+    ----------
+    cables : tuple of Cable
+    windows : tuple of Window
+    segments : int
+        Of the other curves; the report's 100 by default.
 
     Returns
     -------
@@ -167,7 +230,18 @@ def _range(columns: list[Array]) -> tuple[float, float]:
 
 
 def plot_threshold(ax: Axes | None = None) -> list[Artist]:
-    """Fig. 9: the threshold length over the weight of the fish."""
+    """Fig. 9: the threshold length over the weight of the fish.
+
+    Parameters
+    ----------
+    ax : Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    list of Artist
+        Those that carry data.
+    """
     ax = _axes(ax, 9)
     w_f = np.linspace(0.0, 12.0, 481)
     curve = ax.plot(w_f, threshold_length(w_f), **STYLES[0], linewidth=1.7)
@@ -187,7 +261,18 @@ def plot_threshold(ax: Axes | None = None) -> list[Artist]:
 
 
 def plot_short_cables(ax: Axes | None = None) -> list[Artist]:
-    """Fig. 10: solution curves of cables no longer than the threshold."""
+    """Fig. 10: solution curves of cables no longer than the threshold.
+
+    Parameters
+    ----------
+    ax : Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    list of Artist
+        Those that carry data.
+    """
     ax = _axes(ax, 10)
     ax.set_ylim(-7900.0, 550.0)
     curves = _solution_curves(ax, FIG_10, WINDOWS[10])
@@ -196,7 +281,18 @@ def plot_short_cables(ax: Axes | None = None) -> list[Artist]:
 
 
 def plot_outward_shape(ax: Axes | None = None) -> list[Artist]:
-    """Fig. 11: the shape of a cable of threshold length, without a node."""
+    """Fig. 11: the shape of a cable of threshold length, without a node.
+
+    Parameters
+    ----------
+    ax : Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    list of Artist
+        Those that carry data.
+    """
     ax = _axes(ax, 11)
     cables = _shapes(ax, FIG_11, ("a",))
     ax.legend(frameon=False)
@@ -205,7 +301,18 @@ def plot_outward_shape(ax: Axes | None = None) -> list[Artist]:
 
 
 def plot_one_node_curves(ax: Axes | None = None) -> list[Artist]:
-    """Fig. 12: solution curves about the first transition of a cable barely longer than the threshold."""
+    """Fig. 12: solution curves about the first transition of a cable barely longer than the threshold.
+
+    Parameters
+    ----------
+    ax : Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    list of Artist
+        Those that carry data.
+    """
     ax = _axes(ax, 12)
     ax.set_xlim(-100.0, 175.0)
     curves = _solution_curves(ax, FIG_12, WINDOWS[12])
@@ -214,7 +321,18 @@ def plot_one_node_curves(ax: Axes | None = None) -> list[Artist]:
 
 
 def plot_one_node_shapes(ax: Axes | None = None) -> list[Artist]:
-    """Fig. 13: both shapes with one node."""
+    """Fig. 13: both shapes with one node.
+
+    Parameters
+    ----------
+    ax : Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    list of Artist
+        Those that carry data.
+    """
     ax = _axes(ax, 13)
     cables = _shapes(ax, FIG_12[2], ("bl", "br"))
     ax.legend(frameon=False, loc="lower right")
@@ -223,7 +341,18 @@ def plot_one_node_shapes(ax: Axes | None = None) -> list[Artist]:
 
 
 def plot_two_node_curves(ax: Axes | None = None) -> list[Artist]:
-    """Fig. 14: solution curves about the first and the second transition of a long cable."""
+    """Fig. 14: solution curves about the first and the second transition of a long cable.
+
+    Parameters
+    ----------
+    ax : Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    list of Artist
+        Those that carry data.
+    """
     ax = _axes(ax, 14)
     ax.set_ylim(-50.0, 72.0)
     curves = _solution_curves(ax, FIG_14, WINDOWS[14])
@@ -232,7 +361,18 @@ def plot_two_node_curves(ax: Axes | None = None) -> list[Artist]:
 
 
 def plot_two_node_shapes(ax: Axes | None = None) -> list[Artist]:
-    """Fig. 15: both shapes with two nodes."""
+    """Fig. 15: both shapes with two nodes.
+
+    Parameters
+    ----------
+    ax : Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    list of Artist
+        Those that carry data.
+    """
     ax = _axes(ax, 15)
     cables = _shapes(ax, FIG_14[2], ("dl", "dr"))
     ax.legend(frameon=False, loc="upper right")
@@ -241,7 +381,18 @@ def plot_two_node_shapes(ax: Axes | None = None) -> list[Artist]:
 
 
 def plot_experiment_curves(ax: Axes | None = None) -> list[Artist]:
-    """Fig. 16: solution curves of the cable of the photographs of Fig. 3."""
+    """Fig. 16: solution curves of the cable of the photographs of Fig. 3.
+
+    Parameters
+    ----------
+    ax : Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    list of Artist
+        Those that carry data.
+    """
     ax = _axes(ax, 16)
     curves = _solution_curves(ax, FIG_16, WINDOWS[16])
     ax.legend(loc="upper left", frameon=False, title=_facts(FIG_16[0], "lam", "w_f"))
@@ -249,7 +400,18 @@ def plot_experiment_curves(ax: Axes | None = None) -> list[Artist]:
 
 
 def plot_experiment_shapes(ax: Axes | None = None) -> list[Artist]:
-    """Fig. 17: the shapes of the median roots of Fig. 16, side by side."""
+    """Fig. 17: the shapes of the median roots of Fig. 16, side by side.
+
+    Parameters
+    ----------
+    ax : Axes, optional
+        Axes to draw on; new ones by default.
+
+    Returns
+    -------
+    list of Artist
+        Those that carry data.
+    """
     ax = _axes(ax, 17)
     ax.set_axis_off()
     ax.set_title(_facts(FIG_16[0], "lam", "w_f") + "\n\n")
@@ -257,7 +419,7 @@ def plot_experiment_shapes(ax: Axes | None = None) -> list[Artist]:
     for k, cable in enumerate(FIG_16):
         panel = ax.inset_axes((k / 3.0, 0.0, 0.3, 1.0))
         found = cable.equilibria
-        line = _shapes(panel, cable, (root_names(found)[int(np.argmax(found.median))],))
+        line = _shapes(panel, cable, (root_names(found)[found.expected],))
         panel.set(xlim=(-3.4, 5.8), ylim=(39.5, -1.5))
         panel.set_title(f"{_facts(cable, 'gamma')}\n{line[0].get_label()}", fontsize=9)
         if k != 1:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from string import Template
-from typing import Any, cast
+from typing import Any
 
 import matplotlib
 from matplotlib.artist import Artist
@@ -39,8 +39,7 @@ from towatlas.report.figures import (
 from towatlas.report.published import SEGMENTS, Comparison, compare
 from towatlas.report.text import CAPTIONS, PAGE
 from towatlas.solve.critical import solve_critical
-from towatlas.solve.drag_equilibria import DragEquilibria
-from towatlas.solve.equilibria import equilibria, vacuum_equilibria
+from towatlas.solve.equilibria import equilibria
 
 # Share of the height of a curve, about the width of a line, below which a reader sees no difference.
 VISIBLE = 0.005
@@ -52,7 +51,21 @@ DRAG = 0.018
 
 @dataclass(frozen=True)
 class ReportFigure:
-    """A figure of the report. cables : of the solution curves in it. folds : (lam, w_f, n) of the transitions in it."""
+    """A figure of the report.
+
+    Attributes
+    ----------
+    number : int
+        In the report, 9 to 17.
+    title : str
+        What it is called here.
+    draw : callable
+        From axes to the artists that carry data.
+    cables : tuple of Cable
+        Of the solution curves in it.
+    folds : tuple of (float, float, int)
+        lam, w_f and n of the transitions in it.
+    """
 
     number: int
     title: str
@@ -84,7 +97,17 @@ FIGURES = (
 
 @dataclass(frozen=True)
 class Photograph:
-    """One of the photographs of Figs. 3-5 for which the report states the number of nodes; all in air."""
+    """One of the photographs of Figs. 3-5 for which the report states the number of nodes; all in air.
+
+    Attributes
+    ----------
+    figure : str
+        Its number and letter.
+    lam, w_f, gamma : float
+        Cable length, fish weight and speed [-].
+    nodes : int
+        As photographed, >= 1.
+    """
 
     figure: str
     lam: float
@@ -105,24 +128,27 @@ PHOTOGRAPHS = (
 )
 
 
-def vacuum_nodes(lam: float, w_f: float, gamma: float) -> int:
-    """Nodes of the median equilibrium in a vacuum."""
-    found = vacuum_equilibria(lam, w_f, gamma)
-    return int(found.nodes[found.median][0])
-
-
 @cache
-def drag_nodes(lam: float, w_f: float, gamma: float) -> int:
-    """Nodes, with the drag of the experiment, of the equilibrium whose fish is nearest to the axis."""
-    found = cast(DragEquilibria, equilibria(lam, w_f, gamma, C=DRAG))
-    return int(found.nodes[found.near_axis][0])
+def expected_nodes(*, lam: float, w_f: float, gamma: float, C: float = 0.0) -> int:
+    """Nodes of the equilibrium that is expected, in a vacuum or with drag.
+
+    Parameters
+    ----------
+    lam, w_f, gamma : float
+        Cable length, fish weight and speed [-].
+    C : float
+        Drag constant of the cable [-].
+
+    Returns
+    -------
+    int
+    """
+    found = equilibria(lam, w_f, gamma, C=C)
+    return int(found.nodes[found.expected])
 
 
-# A column of the table of photographs for each model: its title, and its number of nodes at (lam, w_f, gamma).
-MODELS: tuple[tuple[str, Callable[[float, float, float], int]], ...] = (
-    ("in a vacuum", vacuum_nodes),
-    ("with drag", drag_nodes),
-)
+# A column of the table of photographs for each model: its title, and its drag constant.
+MODELS = (("in a vacuum", 0.0), ("with drag", DRAG))
 
 
 def write_report(path: str | Path) -> Path:
@@ -146,7 +172,12 @@ def write_report(path: str | Path) -> Path:
 
 
 def report_page() -> str:
-    """The page, as HTML with inline figures and nothing from elsewhere."""
+    """The page, as HTML with inline figures and nothing from elsewhere.
+
+    Returns
+    -------
+    str
+    """
     rows = compare()
     return Template(PAGE).substitute(
         verdict=_verdict(rows),
@@ -244,7 +275,7 @@ def _root_table(cables: tuple[Cable, ...]) -> str:
             head = f'<th scope="rowgroup" rowspan="{len(found)}">{cable.name} {facts}</th>' if k == 0 else ""
             columns = (found.R_x0, ".9g"), (found.x_f, ".6f"), (found.z_f, ".6f")
             cells = "".join(f'<td class="n">{_number(format(column[k], form))}</td>' for column, form in columns)
-            median = ", median" if found.median[k] else ""
+            median = ", median" if k == len(found) // 2 else ""
             name = f"<i>R</i><sup>{name}</sup>{median}"
             rows.append(f'<tr>{head}<td>{name}</td>{cells}<td class="n">{found.nodes[k]}</td></tr>\n')
     return (
@@ -257,8 +288,8 @@ def _root_table(cables: tuple[Cable, ...]) -> str:
 
 def _photograph_row(p: Photograph) -> str:
     cells = ""
-    for _, nodes in MODELS:
-        found = nodes(p.lam, p.w_f, p.gamma)
+    for _, drag in MODELS:
+        found = expected_nodes(lam=p.lam, w_f=p.w_f, gamma=p.gamma, C=drag)
         wrong = "" if found == p.nodes else " wrong"
         cells += f'<td class="n{wrong}">{found}</td>'
     facts = "".join(f'<td class="n">{fact}</td>' for fact in (f"{p.lam:g}", f"{p.w_f:g}", f"{p.gamma:.2f}", p.nodes))
@@ -268,14 +299,15 @@ def _photograph_row(p: Photograph) -> str:
 def _failures() -> str:
     """What each model gets wrong, and by how much the speed misses the transition of the vacuum."""
     sentences = []
-    for title, nodes in MODELS:
-        wrong = [p for p in PHOTOGRAPHS if nodes(p.lam, p.w_f, p.gamma) != p.nodes]
+    for title, drag in MODELS:
+        nodes = {p: expected_nodes(lam=p.lam, w_f=p.w_f, gamma=p.gamma, C=drag) for p in PHOTOGRAPHS}
+        wrong = [p for p in PHOTOGRAPHS if nodes[p] != p.nodes]
         sentences.append(
             f"{title.capitalize()} the number of nodes is right for {len(PHOTOGRAPHS) - len(wrong)} of the "
             f"{len(PHOTOGRAPHS)} photographs{f', wrong for {len(wrong)}' if wrong else ''}."
         )
         for p in wrong:
-            found, speed = nodes(p.lam, p.w_f, p.gamma), float(solve_critical(p.lam, p.w_f, p.nodes).gamma)
+            found, speed = nodes[p], float(solve_critical(p.lam, p.w_f, p.nodes).gamma)
             above = 100.0 * (speed / p.gamma - 1.0)
             sentences.append(
                 f"Fig. {p.figure} has {p.nodes} instead of {found}; in a vacuum {p.nodes} nodes are possible from "

@@ -8,7 +8,7 @@ import numpy as np
 from towatlas.kernels import status
 from towatlas.limits import threshold_length
 from towatlas.solve.critical import solve_critical
-from towatlas.solve.equilibria import vacuum_equilibria
+from towatlas.solve.equilibria import equilibria
 
 SEGMENTS = 100  # of the report
 AIR_15, AIR_0 = 1.225e-3, 1.293e-3  # density of dry air at 15 and at 0 degrees C [g/cm^3]
@@ -19,11 +19,24 @@ INCH, FOOT = 2.54, 30.48  # [cm]
 class Published:
     """One number of the report.
 
-    quantity, place : what it is, and where it is printed. printed, decimals : its value, and how many of its decimals
-    are. relation : how the report relates the quantity to it: "=" printed as its value, "~" read off a figure, "<" or
-    ">" a bound. recompute : the value by this program. recompute_as_then, method : the value by the method that
-    explains the printed one, and its name; None where the printed value needs no explanation. explanation : of the
-    difference, one sentence or two.
+    Attributes
+    ----------
+    quantity, place : str
+        What it is, and where it is printed.
+    printed : float
+        Its value.
+    decimals : int
+        How many of its decimals are printed, >= 0.
+    relation : str
+        How the report relates the quantity to it: "=" printed as its value, "~" read off a figure, "<" or ">" a bound.
+    recompute : callable
+        The value by this program, a float.
+    explanation : str
+        Of the difference, one sentence or two.
+    recompute_as_then : callable, optional
+        The value by the method that explains the printed one; None where the printed value needs no explanation.
+    method : str
+        The name of that method.
     """
 
     quantity: str
@@ -39,7 +52,17 @@ class Published:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A published number beside the recomputed one; `as_then` is nan where no other method was called for."""
+    """A published number beside the recomputed one.
+
+    Attributes
+    ----------
+    published : Published
+        What the report prints.
+    recomputed : float
+        The value by this program.
+    as_then : float
+        That by the method that explains the printed one; nan where none was called for.
+    """
 
     published: Published
     recomputed: float
@@ -56,7 +79,13 @@ class Comparison:
         return relation == "=" and abs(self.recomputed - printed) <= 0.5 * 10.0**-self.published.decimals
 
     def text(self) -> tuple[str, str, str]:
-        """Printed value, recomputed value, value by the method that explains; with two digits more than printed."""
+        """The numbers as they are shown.
+
+        Returns
+        -------
+        printed, recomputed, then : str
+            Printed value, recomputed value, value by the method that explains; with two digits more than printed.
+        """
         p = self.published
         digits = 0 if p.decimals == 0 and float(self.recomputed).is_integer() else p.decimals + 2
         sign = "" if p.relation == "=" else p.relation + " "
@@ -64,12 +93,25 @@ class Comparison:
         return f"{sign}{p.printed:.{p.decimals}f}", f"{self.recomputed:.{digits}f}", then
 
 
-def rk4_root(lam: float, w_f: float, gamma: float, guess: float, segments: int = SEGMENTS) -> float:
-    """Root in R_x0 of E, Eq. (33), near a guess, by the report's method: fourth-order Runge-Kutta, 100 segments."""
+def rk4_root(*, lam: float, w_f: float, gamma: float, guess: float, segments: int = SEGMENTS) -> float:
+    """Root in R_x0 of E, Eq. (33), near a guess, by the report's method: fourth-order Runge-Kutta.
+
+    Parameters
+    ----------
+    lam, w_f, gamma : float
+        Cable length, fish weight and speed [-].
+    guess : float
+    segments : int
+        Of the forward shot; the report's 100 by default.
+
+    Returns
+    -------
+    float
+    """
     from towatlas.kernels.scan import forward_shots
 
     def boundary_error(r_x0: float) -> float:
-        cable = (np.array([value]) for value in (w_f, lam, gamma, r_x0))
+        cable = (np.array([value]) for value in (lam, w_f, gamma, r_x0))
         error, x_end, r_x_end = np.empty(1), np.empty(1), np.empty(1)
         forward_shots(*cable, segments, error, x_end, r_x_end, 0, 1)
         return float(error[0])
@@ -77,8 +119,20 @@ def rk4_root(lam: float, w_f: float, gamma: float, guess: float, segments: int =
     return _secant(boundary_error, guess)
 
 
-def euler_root(lam: float, w_f: float, gamma: float, guess: float, steps: int = SEGMENTS) -> float:
-    """Root in R_x0 of E, Eq. (33), near a guess, by explicit Euler steps: first order, as the report does not do it."""
+def euler_root(*, lam: float, w_f: float, gamma: float, guess: float, steps: int = SEGMENTS) -> float:
+    """Root in R_x0 of E, Eq. (33), near a guess, by explicit Euler steps: first order, as the report does not do it.
+
+    Parameters
+    ----------
+    lam, w_f, gamma : float
+        Cable length, fish weight and speed [-].
+    guess : float
+    steps : int
+
+    Returns
+    -------
+    float
+    """
 
     def boundary_error(r_x0: float) -> float:
         x, force, ds = 1.0, r_x0, lam / steps
@@ -101,12 +155,12 @@ def _secant(function: Callable[[float], float], guess: float) -> float:
     return float(new)
 
 
-def _median(lam: float, w_f: float, gamma: float) -> float:
-    found = vacuum_equilibria(lam, w_f, gamma)
-    return float(found.R_x0[found.median][0])
+def _median(*, lam: float, w_f: float, gamma: float) -> float:
+    found = equilibria(lam, w_f, gamma)
+    return float(found.R_x0[found.expected])
 
 
-def _speed(lam: float, w_f: float, n: int) -> float:
+def _speed(*, lam: float, w_f: float, n: int) -> float:
     return float(solve_critical(lam, w_f, n).gamma)
 
 
@@ -117,10 +171,10 @@ def _highest_first_speed() -> float:
 
 def _most_equilibria_past_threshold() -> float:
     cables = [(float(threshold_length(w_f)) + 0.1, w_f) for w_f in np.arange(0.0, 101.0, 10.0)]
-    return float(max(len(vacuum_equilibria(lam, w_f, 100.0)) for lam, w_f in cables))
+    return float(max(len(equilibria(lam, w_f, 100.0)) for lam, w_f in cables))
 
 
-def _speed_or_never(lam: float, w_f: float, n: int) -> float:
+def _speed_or_never(*, lam: float, w_f: float, n: int) -> float:
     """Critical speed; infinite where there is no such transition."""
     state = solve_critical(lam, w_f, n)
     return np.inf if state.status == status.NO_TRANSITION else float(state.gamma)
@@ -142,21 +196,21 @@ def _root(gamma: float, printed: float, explanation: str) -> Published:
         printed,
         6,
         "=",
-        lambda: _median(37.8, 1352.0, gamma),
+        lambda: _median(lam=37.8, w_f=1352.0, gamma=gamma),
         explanation,
-        lambda: rk4_root(37.8, 1352.0, gamma, printed),
+        lambda: rk4_root(lam=37.8, w_f=1352.0, gamma=gamma, guess=printed),
         "RK4, 100 segments",
     )
 
 
-def _number(lam: float, gamma: float, printed: int, figure: str, w_f: float = 0.0) -> Published:
+def _number(printed: int, figure: str, *, lam: float, w_f: float = 0.0, gamma: float) -> Published:
     return Published(
         f"number of equilibria at lambda = {lam:g}, w_f = {w_f:g}, gamma = {gamma:g}",
         figure,
         printed,
         0,
         "=",
-        lambda: float(len(vacuum_equilibria(lam, w_f, gamma))),
+        lambda: float(len(equilibria(lam, w_f, gamma))),
         "The same.",
     )
 
@@ -177,11 +231,11 @@ PUBLISHED: tuple[Published, ...] = (
         3.79886,
         5,
         "=",
-        lambda: _median(2.0, 0.0, 1.0),
+        lambda: _median(lam=2.0, w_f=0.0, gamma=1.0),
         "No root: E there is -0.018, and Runge-Kutta with 100 segments gives every digit of the recomputed value. "
         "Explicit Euler steps, 100 of them, come within 0.00003 of the printed value: an error of first order in the "
         "step, though not to the last digit.",
-        lambda: euler_root(2.0, 0.0, 1.0, 3.8),
+        lambda: euler_root(lam=2.0, w_f=0.0, gamma=1.0, guess=3.8),
         "explicit Euler, 100 steps",
     ),
     Published(
@@ -190,7 +244,7 @@ PUBLISHED: tuple[Published, ...] = (
         6.2,
         1,
         "~",
-        lambda: _speed(2.1, 0.0, 1),
+        lambda: _speed(lam=2.1, w_f=0.0, n=1),
         _CURVE.format("5.0"),
     ),
     Published(
@@ -199,7 +253,7 @@ PUBLISHED: tuple[Published, ...] = (
         0.5,
         1,
         "~",
-        lambda: _speed(10.0, 0.0, 1),
+        lambda: _speed(lam=10.0, w_f=0.0, n=1),
         "The lowest speed of the figure, whose curve the report calls just past tangency.",
     ),
     Published(
@@ -208,13 +262,21 @@ PUBLISHED: tuple[Published, ...] = (
         1.5,
         1,
         "~",
-        lambda: _speed(10.0, 0.0, 2),
+        lambda: _speed(lam=10.0, w_f=0.0, n=2),
         _CURVE.format("1.0"),
     ),
     Published(
-        "gamma_c2(37.8, 1352)", "after Fig. 16", 2.97, 2, ">", lambda: _speed(37.8, 1352.0, 2), "The bound holds."
+        "gamma_c2(37.8, 1352)",
+        "after Fig. 16",
+        2.97,
+        2,
+        ">",
+        lambda: _speed(lam=37.8, w_f=1352.0, n=2),
+        "The bound holds.",
     ),
-    Published("gamma_c2(37.8, 0)", "after Fig. 16", 1.5, 1, "<", lambda: _speed(37.8, 0.0, 2), "The bound holds."),
+    Published(
+        "gamma_c2(37.8, 0)", "after Fig. 16", 1.5, 1, "<", lambda: _speed(lam=37.8, w_f=0.0, n=2), "The bound holds."
+    ),
     Published(
         "highest gamma_c1(lambda_c + 0.1, w_f), w_f = 0, 10, ... 100",
         "above Fig. 12",
@@ -239,7 +301,7 @@ PUBLISHED: tuple[Published, ...] = (
         100.0,
         0,
         ">",
-        lambda: _speed_or_never(2.1, 0.0, 2),
+        lambda: _speed_or_never(lam=2.1, w_f=0.0, n=2),
         "The bound holds: the report doubts that there is such a speed, and without a fish a cable no longer than 4 "
         "has none.",
     ),
@@ -249,7 +311,7 @@ PUBLISHED: tuple[Published, ...] = (
         3.9,
         1,
         "~",
-        lambda: _speed(37.8, 1352.0, 2),
+        lambda: _speed(lam=37.8, w_f=1352.0, n=2),
         "Photographed in air, recomputed for a vacuum: there the shapes with two nodes begin to exist at a lower "
         "speed.",
     ),
@@ -263,15 +325,15 @@ PUBLISHED: tuple[Published, ...] = (
         "Every digit is right.",
     ),
     Published("lambda_c(0)", "Fig. 11", 2.0, 0, "=", lambda: float(threshold_length(0.0)), "The same."),
-    _number(2.0, 39.0, 1, "Fig. 10"),
-    _number(1.05, 19.0, 1, "Fig. 10", w_f=10.0),
-    _number(1.8, 39.0, 1, "Fig. 10"),
-    _number(2.1, 3.8, 1, "Fig. 12"),
-    _number(2.1, 5.0, 1, "Fig. 12"),
-    _number(2.1, 6.2, 3, "Fig. 12"),
-    _number(10.0, 0.5, 3, "Fig. 14"),
-    _number(10.0, 1.0, 3, "Fig. 14"),
-    _number(10.0, 1.5, 5, "Fig. 14"),
+    _number(1, "Fig. 10", lam=2.0, gamma=39.0),
+    _number(1, "Fig. 10", lam=1.05, gamma=19.0, w_f=10.0),
+    _number(1, "Fig. 10", lam=1.8, gamma=39.0),
+    _number(1, "Fig. 12", lam=2.1, gamma=3.8),
+    _number(1, "Fig. 12", lam=2.1, gamma=5.0),
+    _number(3, "Fig. 12", lam=2.1, gamma=6.2),
+    _number(3, "Fig. 14", lam=10.0, gamma=0.5),
+    _number(3, "Fig. 14", lam=10.0, gamma=1.0),
+    _number(5, "Fig. 14", lam=10.0, gamma=1.5),
     Published(
         "w_f of the fish of 14.132 g", "Fig. 3", 1352.0, 0, "=", lambda: _weight(14.132), "Every digit is right."
     ),
@@ -293,7 +355,12 @@ PUBLISHED: tuple[Published, ...] = (
 
 
 def compare() -> list[Comparison]:
-    """Every number of `PUBLISHED` recomputed, in order; takes about a second, and compiles kernels the first time.
+    """Every number of `PUBLISHED` recomputed; takes about a second, and compiles kernels the first time.
+
+    Returns
+    -------
+    list of Comparison
+        In the order of PUBLISHED.
 
     Examples
     --------

@@ -55,7 +55,17 @@ class SceneFileError(OSError):
 
 
 def shipped_scenes() -> list[str]:
-    """Names of the scenes that come with the package."""
+    """Names of the scenes that come with the package.
+
+    Returns
+    -------
+    list of str
+
+    Examples
+    --------
+    >>> shipped_scenes()
+    ['skop-fig3', 'skop-fig4', 'skop-fig5']
+    """
     folder = resources.files("towatlas.scene") / "scenes"
     return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
@@ -81,8 +91,8 @@ def read_scene(path: str | os.PathLike) -> Scene:
 
     Examples
     --------
-    >>> groups = read_scene("skop-fig3").groups("air")
-    >>> round(groups.lam, 1), round(groups.w_f), round(groups.C, 3)
+    >>> system = read_scene("skop-fig3").system("air")
+    >>> round(system.lam, 1), round(system.w_f), round(system.C, 3)
     (37.8, 1352, 0.018)
     """
     file: Path | Traversable = Path(path)
@@ -107,7 +117,24 @@ def read_scene(path: str | os.PathLike) -> Scene:
 
 
 def make_scene(table: dict[str, Any], source: str = "") -> Scene:
-    """A scene from the tables of its file; errors as `read_scene`, without the name of the file."""
+    """A scene from the tables of its file.
+
+    Parameters
+    ----------
+    table : dict
+        As `tomllib` reads them.
+    source : str
+        Where it was read from.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    ValueError
+        As `read_scene`, without the name of the file.
+    """
     values = _parse(table)
     fish = any(key.startswith("fish.") for key in values) or "fish" in table
     density = _density(values)

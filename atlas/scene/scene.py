@@ -4,41 +4,50 @@ from dataclasses import dataclass, replace
 from math import pi, sqrt
 from typing import Any
 
+from towatlas.checks import check_one
+from towatlas.system import System
+
 KNOT = 1852.0 / 3600.0  # m/s
 # The models of the report's Table 1, in rising order of what they take into account.
 MODELS = ("vacuum", "air", "water")
 
 
 @dataclass(frozen=True)
-class Groups:
-    """The dimensionless groups of a scene; nan where the scene does not say enough.
-
-    w : weight of the cable, Eq. (13a). gamma : speed, (13b). C : drag constant of the cable, (13c). lam : length, (17).
-    w_f, m_f, C_f : weight, mass and drag constant of the fish, (16a) to (16c).
-
-    References
-    ----------
-    NRL Report 7048, Table 1.
-    """
-
-    w: float
-    gamma: float
-    C: float
-    lam: float
-    w_f: float
-    m_f: float
-    C_f: float
-
-
-@dataclass(frozen=True)
 class Scene:
     """A cable towed in a circle, in SI.
 
-    title : text. source : where it was read from. length : of the cable [m], nan if not given. mass_per_length : in
-    air [kg/m]. diameter [m] and drag_coefficient [-] : of the cable, nan if not given, as a vacuum allows. fish_mass
-    [kg], fish_displaced : mass of the fluid that the fish displaces [kg], nan if not given, fish_added_mass [kg],
-    fish_drag_area : drag coefficient by frontal area [m^2]. radius : of the tow point's circle [m]. speed : of the tow
-    point [m/s]. density : of the fluid [kg/m^3]. gravity [m/s^2]. tolerance : relative [-].
+    Attributes
+    ----------
+    title : str
+        What it is called.
+    source : str
+        Where it was read from.
+    length : float
+        Of the cable [m], > 0; nan if not given.
+    mass_per_length : float
+        Of the cable, in air [kg/m], > 0.
+    diameter : float
+        Of the cable [m], > 0; nan if not given, as a vacuum allows.
+    drag_coefficient : float
+        Of the cable [-], >= 0; nan if not given, as a vacuum allows.
+    fish_mass : float
+        In air [kg], >= 0.
+    fish_displaced : float
+        Mass of the fluid that the fish displaces [kg], >= 0; nan if not given.
+    fish_added_mass : float
+        Of the fluid that moves with the fish [kg], >= 0.
+    fish_drag_area : float
+        Drag coefficient by frontal area [m^2], >= 0.
+    radius : float
+        Of the circle of the tow point [m], > 0.
+    speed : float
+        Of the tow point [m/s], > 0.
+    density : float
+        Of the fluid [kg/m^3], >= 0; 0 in a vacuum.
+    gravity : float
+        [m/s^2], > 0.
+    tolerance : float
+        Within which models agree, relative [-], > 0.
     """
 
     title: str
@@ -59,7 +68,7 @@ class Scene:
 
     @property
     def gamma(self) -> float:
-        """Dimensionless speed, Eq. (13b)."""
+        """Dimensionless speed Omega sqrt(R/g), Eq. (13b) [-]."""
         return self.speed / sqrt(self.radius * self.gravity)
 
     @property
@@ -81,16 +90,38 @@ class Scene:
         return "water" if dense else "air"
 
     def force_unit(self, model: str = "vacuum") -> float:
-        """What forces are divided by, (mu + rho A) g R [N]."""
+        """What forces are divided by.
+
+        Parameters
+        ----------
+        model : str
+            One of MODELS.
+
+        Returns
+        -------
+        float
+            (mu + rho A) g R [N].
+        """
         return self.mass_unit(model) * self.gravity * self.radius
 
     def mass_unit(self, model: str) -> float:
-        """Mass per length that masses are divided by, mu + rho A, or mu alone where buoyancy is neglected [kg/m]."""
+        """Mass per length that masses are divided by.
+
+        Parameters
+        ----------
+        model : str
+            One of MODELS.
+
+        Returns
+        -------
+        float
+            mu + rho A, or mu alone where buoyancy is neglected [kg/m].
+        """
         check_model(model)
         return self.mass_per_length + (self.displaced_per_length if model == "water" else 0.0)
 
-    def groups(self, model: str) -> Groups:
-        """The dimensionless groups of one of the models of Table 1.
+    def system(self, model: str) -> System:
+        """The dimensionless groups of one of the models of Table 1; the speed beside them is `gamma`.
 
         Parameters
         ----------
@@ -99,8 +130,8 @@ class Scene:
 
         Returns
         -------
-        Groups
-            nan where a key that the group needs is not given.
+        System
+            nan where a key that the group needs is not given; `System.missing` names those.
 
         Raises
         ------
@@ -117,44 +148,94 @@ class Scene:
         displaced = self.displaced_per_length if heavy else 0.0
         fish_displaced = self.fish_displaced if heavy and self.density else 0.0
         added = self.fish_added_mass if heavy and self.density else 0.0
-        return Groups(
-            w=(self.mass_per_length - displaced) / unit,
-            gamma=self.gamma,
-            C=drag * self.drag_coefficient * self.diameter * self.radius / unit if drag else 0.0,
+        return System(
             lam=self.length / self.radius,
             w_f=(self.fish_mass - fish_displaced) / (unit * self.radius),
             m_f=(self.fish_mass + added) / (unit * self.radius),
+            C=drag * self.drag_coefficient * self.diameter * self.radius / unit if drag else 0.0,
             C_f=drag * self.fish_drag_area / unit,
+            w=(self.mass_per_length - displaced) / unit,
         )
 
     def speed_of(self, gamma: Any) -> Any:
-        """Speed of the tow point [m/s] at a dimensionless one, Eq. (13b)."""
+        """Speed of the tow point at a dimensionless one, Eq. (13b).
+
+        Parameters
+        ----------
+        gamma : float or ndarray
+            [-].
+
+        Returns
+        -------
+        float or ndarray
+            [m/s].
+        """
         return gamma * sqrt(self.radius * self.gravity)
 
     def rpm_of(self, gamma: Any) -> Any:
-        """Turns a minute at a dimensionless speed."""
+        """Turns a minute at a dimensionless speed.
+
+        Parameters
+        ----------
+        gamma : float or ndarray
+            [-].
+
+        Returns
+        -------
+        float or ndarray
+            [rpm].
+        """
         return gamma * (sqrt(self.gravity / self.radius) * 30.0 / pi)
 
     def at(
         self, *, speed: float | None = None, rotation_rate: float | None = None, gamma: float | None = None
     ) -> "Scene":
-        """The same scene at another speed: one of m/s, rad/s, or dimensionless."""
-        given = [
-            value
-            for value in (
-                speed,
-                None if rotation_rate is None else rotation_rate * self.radius,
-                None if gamma is None else self.speed_of(gamma),
-            )
-            if value is not None
-        ]
-        if len(given) != 1:
-            raise ValueError(f"give exactly one of speed, rotation_rate and gamma, not {len(given)}")
-        return replace(self, speed=given[0])
+        """The same scene at another speed; exactly one of these.
+
+        Parameters
+        ----------
+        speed : float, optional
+            Of the tow point [m/s].
+        rotation_rate : float, optional
+            [rad/s].
+        gamma : float, optional
+            Omega sqrt(R/g) [-].
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        ValueError
+            For none of them, or several.
+        """
+        given = {"speed": speed, "rotation_rate": rotation_rate, "gamma": gamma}
+        checked = {name: check_one(name, value) for name, value in given.items() if value is not None}
+        if len(checked) != 1:
+            raise ValueError(f"give exactly one of speed, rotation_rate and gamma, not {len(checked)}")
+        ((name, value),) = checked.items()
+        speeds = {"speed": value, "rotation_rate": value * self.radius, "gamma": self.speed_of(value)}
+        return replace(self, speed=speeds[name])
 
 
 def check_model(model: str) -> str:
-    """The name of one of the models of Table 1."""
+    """The name of one of the models of Table 1.
+
+    Parameters
+    ----------
+    model : str
+
+    Returns
+    -------
+    str
+        The same.
+
+    Raises
+    ------
+    ValueError
+        For another.
+    """
     if model not in MODELS:
         raise ValueError(f"model must be one of {', '.join(MODELS)}; got {model!r}")
     return model

@@ -1,6 +1,5 @@
 """Critical speeds solved directly, without an atlas."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from towatlas.checks import check_broadcast, check_order, check_positive_finite, check_real
 from towatlas.kernels import status
 from towatlas.limits import unchecked_excess_length
+from towatlas.results import CriticalStates
 from towatlas.solve.fold_seeds import seed
 
 Array = NDArray[np.float64]
@@ -17,42 +17,14 @@ Array = NDArray[np.float64]
 PARALLEL_FROM = 256
 
 
-@dataclass(frozen=True)
-class CriticalStates:
-    """Critical states of towed cables; all arrays of one shape, all dimensionless.
-
-    n, lam, w_f : what was asked. gamma, R_x0, x_f, z_f, tension : the state, nan where there is none. error :
-    estimated relative error of gamma. status : codes of `towatlas.kernels.status`; `sentence` puts them in words.
-    """
-
-    n: NDArray[np.int64]
-    lam: Array
-    w_f: Array
-    gamma: Array
-    R_x0: Array
-    x_f: Array
-    z_f: Array
-    tension: Array
-    error: Array
-    status: NDArray[np.int8]
-
-    def sentence(self, index: Any = ()) -> str:
-        """The status of one state in words."""
-        return status.SENTENCES[int(self.status[index])]
-
-
 def solve_rows(
-    n: NDArray[np.int64],
-    w_f: NDArray[np.float64],
-    lam: NDArray[np.float64],
-    excess: NDArray[np.float64],
-    guess: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
+    *, lam: Array, w_f: Array, n: NDArray[np.int64], excess: Array, guess: tuple[Array, Array] | None = None
 ) -> dict[str, NDArray[Any]]:
     """Critical states of the rows given, by the direct solver; no checks.
 
     Parameters
     ----------
-    n, w_f, lam, excess : ndarray, shape (rows,)
+    lam, w_f, n, excess : ndarray, shape (rows,)
         `excess` is lambda - lambda_cn, given apart so that it may be known better than lambda's rounding allows.
     guess : pair of ndarray, shape (rows,), optional
         Fish offset gamma^2 x_f and gamma to start from.
@@ -62,30 +34,30 @@ def solve_rows(
     dict of ndarray, shape (rows,)
         gamma, R_x0, x_f, z_f, tension, error, status. nan where status is not OK.
     """
-    from towatlas.kernels.folds import solve_folds
+    from towatlas.kernels.folds import Cables, Folds, solve_folds
     from towatlas.kernels.sweeps import solve_folds_parallel
 
     rows = len(n)
     if guess is None:
-        a, gamma, slopes = seed(n, w_f, lam, excess, solve_rows)
+        a, gamma, slopes = seed(lam=lam, w_f=w_f, n=n, excess=excess, solve=solve_rows)
     else:
         a, gamma, slopes = np.abs(guess[0]), guess[1].copy(), np.full((rows, 4), np.nan)
-    results = np.empty((rows, 4))
+    states = np.empty((rows, 4))
     error = np.empty(rows)
     codes = np.empty(rows, np.int64)
     # Copies, because broadcast views are read-only, and numba would compile the kernel anew for those.
-    columns = [np.array(column, order="C") for column in (n, w_f, lam, excess)]
+    columns = [np.array(column, order="C") for column in (lam, w_f, n, excess)]
     if rows >= PARALLEL_FROM:
-        solve_folds_parallel(*columns, a, gamma, slopes, results, error, codes)
+        solve_folds_parallel(*columns, a, gamma, slopes, states, error, codes)
     else:
-        solve_folds(*columns, a, gamma, slopes, results, error, codes, 0, rows)
+        solve_folds(Cables(*columns), Folds(a, gamma, slopes, states, error, codes), 0, rows)
     with np.errstate(over="ignore"):
-        tension = np.where(codes == status.OK, np.hypot(w_f + lam, results[:, 1]), np.nan)
+        tension = np.where(codes == status.OK, np.hypot(w_f + lam, states[:, 1]), np.nan)
     return {
-        "gamma": results[:, 0],
-        "R_x0": results[:, 1],
-        "x_f": results[:, 2],
-        "z_f": results[:, 3],
+        "gamma": states[:, 0],
+        "R_x0": states[:, 1],
+        "x_f": states[:, 2],
+        "z_f": states[:, 3],
         "tension": tension,
         "error": error,
         "status": codes.astype(np.int8),
@@ -134,6 +106,6 @@ def solve_critical(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Critical
     check_positive_finite("lam", lam)
     check_positive_finite("w_f", w_f, zero=True)
     lam, w_f, n = check_broadcast(lam=lam, w_f=w_f, n=check_order(n))
-    flat_n, flat_w, flat_lam = n.ravel(), w_f.ravel(), lam.ravel()
-    columns = solve_rows(flat_n, flat_w, flat_lam, unchecked_excess_length(flat_lam, flat_w, flat_n))
+    cables: dict[str, Any] = {"lam": lam.ravel(), "w_f": w_f.ravel(), "n": n.ravel()}
+    columns = solve_rows(**cables, excess=unchecked_excess_length(**cables))
     return CriticalStates(n=n, lam=lam, w_f=w_f, **{name: column.reshape(n.shape) for name, column in columns.items()})

@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 
 from towatlas.checks import check_one
 from towatlas.kernels import status
+from towatlas.numerics.hermite import cubic
+from towatlas.numerics.rows import EPS, bracket
 from towatlas.solve.equilibria import FEW
-from towatlas.solve.members import EPS, Shoot, extrema, shoot_lanes, shoot_singly
+from towatlas.solve.members import Shoot, extrema, shoot_lanes, shoot_singly
 
 # Offsets tried at first, and how closely a cubic through values and slopes must meet p / gamma^2 between them.
 FIRST = 400
@@ -26,18 +28,35 @@ FINEST = 1e-6  # shortest interval in log a
 MARGIN = 1.5
 # Half waves on the longest shot beyond which a search, of thousands of such shots, is refused: some twenty seconds.
 HALF_WAVES = 500.0
-ROUNDS = 200
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class Placements:
-    """Every cable that puts the fish at one depth, in rising order of length; arrays of shape (cables,), dimensionless.
+class CablesToDepth:
+    """Every cable, towed in a vacuum, that puts the fish at one depth, in rising order of length.
 
-    w_f, gamma, z_f : what was asked. lam : length. R_x0 : radial reaction at the tow point. x_f : radial position of
-    the fish. tension : at the tow point. nodes : number of nodes. outer : whether it is the member of its pair farther
-    from the axis.
+    Attributes
+    ----------
+    w_f : float
+        Weight of the fish over (mu + rho A) g R [-], >= 0.
+    gamma : float
+        Speed Omega sqrt(R/g) [-], > 0.
+    z_f : float
+        Depth of the fish over tow radius [-], > 0.
+    lam : ndarray, shape (cables,)
+        Length of the cable over tow radius [-], >= z_f.
+    R_x0 : ndarray, shape (cables,)
+        Radial force of the cable at the tow point over (mu + rho A) g R [-].
+    x_f : ndarray, shape (cables,)
+        Radial position of the fish over tow radius [-].
+    tension : ndarray, shape (cables,)
+        At the tow point, over (mu + rho A) g R [-], > 0.
+    nodes : ndarray of int, shape (cables,)
+        Number of nodes [-], >= 0.
+    outer : ndarray of bool, shape (cables,)
+        Whether the shape is the member of its pair farther from the axis.
     """
 
     w_f: float
@@ -47,14 +66,14 @@ class Placements:
     R_x0: Array
     x_f: Array
     tension: Array
-    nodes: NDArray[np.int64]
+    nodes: Integers
     outer: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.lam)
 
 
-def cables_to_depth(w_f: float, gamma: float, z_f: float, lam_max: float) -> Placements:
+def cables_to_depth(*, w_f: float, gamma: float, z_f: float, lam_max: float) -> CablesToDepth:
     """All lengths up to lam_max of a cable, towed in a vacuum, with an equilibrium that has the fish at one depth.
 
     Parameters
@@ -70,7 +89,7 @@ def cables_to_depth(w_f: float, gamma: float, z_f: float, lam_max: float) -> Pla
 
     Returns
     -------
-    Placements
+    CablesToDepth
         Empty where there is none.
 
     Raises
@@ -88,13 +107,13 @@ def cables_to_depth(w_f: float, gamma: float, z_f: float, lam_max: float) -> Pla
 
     Examples
     --------
-    >>> found = cables_to_depth(0, 2, 10, 60)
+    >>> found = cables_to_depth(w_f=0, gamma=2, z_f=10, lam_max=60)
     >>> [(round(float(lam), 4), int(nodes)) for lam, nodes in zip(found.lam, found.nodes)]
     [(13.535, 3), (21.5848, 3), (28.1156, 2)]
     """
     w_f, gamma = check_one("w_f", w_f, zero=True), check_one("gamma", gamma)
     z_f, lam_max = check_one("z_f", z_f), check_one("lam_max", lam_max)
-    search = _Search(w_f, gamma, z_f, lam_max)
+    search = _Search(w_f=w_f, gamma=gamma, z_f=z_f, lam_max=lam_max)
     low, high = search.ends()
     empty = np.empty(0)
     x = _roots(search, low, high) if low < high and lam_max >= z_f else empty
@@ -106,7 +125,7 @@ def cables_to_depth(w_f: float, gamma: float, z_f: float, lam_max: float) -> Pla
     lam, r_x0 = tau / search.gamma2, sign * f / search.gamma2
     # p has the sign (-1)^n, and q has passed n zeros on the inner member of the n-th pair, n - 1 on the outer one.
     outer = (count % 2 == 0) != (sign > 0.0)
-    return Placements(
+    return CablesToDepth(
         w_f=w_f,
         gamma=gamma,
         z_f=z_f,
@@ -117,19 +136,6 @@ def cables_to_depth(w_f: float, gamma: float, z_f: float, lam_max: float) -> Pla
         nodes=count + outer,
         outer=outer,
     )
-
-
-def needs_lanes(w_f: float, gamma: float, lam_max: float) -> bool:
-    """Whether the longest cable has so many nodes that the search takes the kernel of many lanes; ArithmeticError
-    where it would take minutes."""
-    highest, codes = extrema(np.array([w_f]), np.array([MARGIN * lam_max]), np.array([gamma]), shoot_singly)
-    _check(codes)
-    if highest[0] > HALF_WAVES:
-        raise ArithmeticError(
-            f"cables up to {lam_max:g} tow radii long would have shapes of up to {highest[0] / MARGIN:.0f} nodes at "
-            "this speed, too many to search; name a shorter longest cable (--max-length)"
-        )
-    return bool(highest[0] > FEW)
 
 
 @dataclass(frozen=True)
@@ -147,12 +153,12 @@ class _Ends:
 class _Search:
     """The shots of one family, as a function of log a."""
 
-    def __init__(self, w_f: float, gamma: float, z_f: float, lam_max: float):
+    def __init__(self, *, w_f: float, gamma: float, z_f: float, lam_max: float):
         self.gamma2 = gamma * gamma
         self.mu, self.depth = self.gamma2 * w_f, self.gamma2 * z_f
         self.lam_max = lam_max
         self.longest = MARGIN * self.gamma2 * lam_max
-        self.shoot: Shoot = shoot_lanes if needs_lanes(w_f, gamma, lam_max) else shoot_singly
+        self.shoot: Shoot = shoot_lanes if _half_waves(w_f=w_f, gamma=gamma, lam_max=lam_max) > FEW else shoot_singly
 
     def ends(self) -> tuple[float, float]:
         """Between which log a every equilibrium lies."""
@@ -163,41 +169,42 @@ class _Search:
     def at(self, x: Array) -> _Ends:
         """Shots ended at the depth wanted, by Newton in the length, inside a bracket."""
         rows, a = len(x), np.exp(x)
-        # dz/dt <= 1: it takes at least as much cable as the depth.
-        low, high = np.full(rows, self.depth), np.full(rows, np.inf)
-        tau = np.minimum(self.depth * np.hypot(1.0, a), self.longest)
         state, counts = np.full((rows, 6), np.nan), np.zeros(rows, np.int64)
-        i = np.arange(rows)
-        for round_ in range(ROUNDS):
-            if not len(i):
-                break
-            ends, count, codes = self.shoot(a[i], np.full(len(i), self.mu), tau[i])
+
+        def depth(tau: Array, i: Integers) -> tuple[Array, Array]:
+            ends, count, codes = self.shoot(a[i], np.full(len(i), self.mu), tau)
             _check(codes)
             state[i], counts[i] = ends, count
-            t = self.mu + ends[:, 0]
-            miss = ends[:, 3] - self.depth
-            step = -miss * np.hypot(1.0, ends[:, 1] / t)
-            above = miss > 0.0
-            unreached = ~above & (tau[i] >= self.longest) & (miss < 0.0)
-            high[i[above]], low[i[~above]] = tau[i[above]], tau[i[~above]]
-            narrow = np.isfinite(high[i]) & (high[i] - low[i] <= 4.0 * EPS * tau[i])
-            done = (np.abs(step) <= 4.0 * EPS * tau[i]) | narrow | unreached
-            state[i[unreached]] = np.nan
-            trial = tau[i] + step
-            # Until the depth is passed the longest cable is the last one tried.
-            trial = np.where(np.isinf(high[i]), np.minimum(trial, self.longest), trial)
-            astray = ~((trial > low[i]) & (trial < high[i])) | (round_ % 8 == 7)
-            middle = 0.5 * (low[i] + np.minimum(high[i], self.longest))
-            tau[i] = np.where(done, tau[i], np.where(astray, middle, trial))
-            i = i[~done]
-        if len(i):
+            return ends[:, 3] - self.depth, 1.0 / np.hypot(1.0, ends[:, 1] / (self.mu + ends[:, 0]))
+
+        # dz/dt <= 1: it takes at least as much cable as the depth.
+        shortest = np.minimum(self.depth, self.longest)
+        found, solved = bracket(
+            depth, np.full(rows, shortest), np.full(rows, self.longest), start=self.depth * np.hypot(1.0, a)
+        )
+        if not solved.all():
             raise ArithmeticError(status.SENTENCES[status.NOT_CONVERGED])
+        state[np.isnan(found)] = np.nan
         tau, f, p, _, v, q = state.T
         t = self.mu + tau
         # At fixed length z = r + p^2 / 2 less its value at the fish; at fixed depth the length takes that up.
         z_slope = f * v / np.hypot(t, f) + p * q - self.mu * a / np.hypot(1.0, a) - a
         slope = a * (q + f / t * z_slope)
         return _Ends(p / self.gamma2, slope / self.gamma2, tau, f, p, counts)
+
+
+def _half_waves(*, w_f: float, gamma: float, lam_max: float) -> int:
+    """Half waves on the longest shot; ArithmeticError where the search would take minutes."""
+    highest, codes = extrema(
+        lam=np.array([MARGIN * lam_max]), w_f=np.array([w_f]), gamma=np.array([gamma]), shoot=shoot_singly
+    )
+    _check(codes)
+    if highest[0] > HALF_WAVES:
+        raise ArithmeticError(
+            f"cables up to {lam_max:g} tow radii long would have shapes of up to {highest[0] / MARGIN:.0f} nodes at "
+            "this speed, too many to search; name a shorter longest cable (--max-length)"
+        )
+    return int(highest[0])
 
 
 def _check(codes: NDArray[np.int64]) -> None:
@@ -208,22 +215,37 @@ def _check(codes: NDArray[np.int64]) -> None:
 def _roots(search: _Search, low: float, high: float) -> Array:
     """All log a with p = +-gamma^2."""
     x, value, slope = _sampled(search, low, high)
-    turns = _between(slope)
-    peaks = _illinois(lambda x: search.at(x).slope, x[turns], x[turns + 1], slope[turns], slope[turns + 1])
+    k = _between(slope)
+    peaks = _solved(lambda ends: (ends.slope, np.full(len(ends.slope), np.nan)), search, x[k], x[k + 1], slope[k])
     x = np.concatenate([x, peaks])
     value = np.concatenate([value, search.at(peaks).value])
     order = np.argsort(x)
     x, value = x[order], value[order]
     found = []
     for level in (1.0, -1.0):
-        miss = value - level
-        k = _between(miss)
+        k = _between(value - level)
 
-        def missed(x: Array, level: float = level) -> Array:
-            return search.at(x).value - level
+        def missed(ends: _Ends, level: float = level) -> tuple[Array, Array]:
+            return ends.value - level, ends.slope
 
-        found.append(_illinois(missed, x[k], x[k + 1], miss[k], miss[k + 1]))
+        found.append(_solved(missed, search, x[k], x[k + 1], value[k] - level))
     return np.concatenate(found)
+
+
+def _solved(
+    function: Callable[[_Ends], tuple[Array, Array]], search: _Search, low: Array, high: Array, at_low: Array
+) -> Array:
+    """Roots of a function of shots, given with its slope, in brackets."""
+    rising = np.where(at_low > 0.0, -1.0, 1.0)
+
+    def turned(x: Array, i: Integers) -> tuple[Array, Array]:
+        value, slope = function(search.at(x))
+        return value * rising[i], slope * rising[i]
+
+    roots, solved = bracket(turned, low, high, resolution=4.0 * EPS)
+    if not solved.all():
+        raise ArithmeticError(status.SENTENCES[status.NOT_CONVERGED])
+    return roots
 
 
 def _between(values: Array) -> NDArray[np.int64]:
@@ -243,35 +265,14 @@ def _sampled(search: _Search, low: float, high: float) -> tuple[Array, Array, Ar
         width = x[right] - x[left]
         middle = 0.5 * (x[left] + x[right])
         ends = search.at(middle)
-        cubic = 0.5 * (value[left] + value[right]) + 0.125 * width * (slope[left] - slope[right])
+        between = cubic(value[left], value[right], slope[left], slope[right], width, 0.5)
         near = np.minimum(np.abs(value[left]), np.abs(value[right]))
-        good = np.abs(ends.value - cubic) <= CLOSE * np.maximum(1.0, near)
+        good = np.abs(ends.value - between) <= CLOSE * np.maximum(1.0, near)
         # Where a shot does not reach the depth, nothing beyond is wanted: only neighbours of one that does matter.
         reached = np.isfinite(value[left]) | np.isfinite(value[right]) | np.isfinite(ends.value)
-        split = ~good & reached & (width > np.where(np.isfinite(cubic), FINEST, 1e-3))
+        split = ~good & reached & (width > np.where(np.isfinite(between), FINEST, 1e-3))
         new = len(x) + np.arange(len(middle))
         x, value, slope = (np.concatenate(pair) for pair in ((x, middle), (value, ends.value), (slope, ends.slope)))
         left, right = np.concatenate([left[split], new[split]]), np.concatenate([new[split], right[split]])
     order = np.argsort(x)
     return x[order], value[order], slope[order]
-
-
-def _illinois(function: Callable[[Array], Array], low: Array, high: Array, at_low: Array, at_high: Array) -> Array:
-    """Roots inside brackets, all at once, to rounding: false position with halved ends, now and then bisection."""
-    # The bracket may be turned round: `new` is the last point tried, `old` the end on the other side of the root.
-    old, new, at_old, at_new = low.copy(), high.copy(), at_low.copy(), at_high.copy()
-    i = np.arange(len(low))
-    for round_ in range(ROUNDS):
-        if not len(i):
-            return new
-        trial = new[i] - at_new[i] * (new[i] - old[i]) / (at_new[i] - at_old[i])
-        between = (trial - new[i]) * (trial - old[i]) < 0.0
-        trial = np.where(between & (round_ % 8 != 7), trial, 0.5 * (new[i] + old[i]))
-        y = function(trial)
-        turned = (y > 0.0) != (at_new[i] > 0.0)
-        old[i], at_old[i] = np.where(turned, new[i], old[i]), np.where(turned, at_new[i], 0.5 * at_old[i])
-        moved = np.abs(trial - new[i])
-        new[i], at_new[i] = trial, y
-        tiny = 4.0 * EPS * np.maximum(1.0, np.abs(trial))
-        i = i[(y != 0.0) & (np.abs(trial - old[i]) > tiny) & (moved > 0.25 * tiny)]
-    raise ArithmeticError(status.SENTENCES[status.NOT_CONVERGED])

@@ -1,16 +1,16 @@
 """All equilibria of one cable at one speed."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.checks import check_one
 from towatlas.kernels import status
 from towatlas.limits import threshold_offset, unchecked_excess_length
+from towatlas.results import Equilibria
 from towatlas.solve.critical import solve_rows
-from towatlas.solve.drag_equilibria import DragEquilibria, check_system, solve_drag_equilibria
+from towatlas.solve.drag_equilibria import solve_drag_equilibria
 from towatlas.solve.members import Members, extrema, shoot_lanes, shoot_singly, solve_members
+from towatlas.system import System
 
 # Segments of the forward shot that bears witness to each root.
 WITNESS_SEGMENTS = 10_000
@@ -20,32 +20,8 @@ FEW = 50
 HALF_WAVES = 2e7
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Equilibria:
-    """Every equilibrium of one cable, in rising order of R_x0; arrays of shape (equilibria,), all dimensionless.
-
-    lam, w_f, gamma : the cable and its speed. R_x0 : radial reaction at the tow point. x_f, z_f : position of the fish.
-    tension : at the tow point. nodes : number of nodes. median : which one is the median root, the shape that Skop
-    expects to be seen. boundary_error : E of Eq. (33) of a forward shot with this R_x0, an independent witness, in
-    which its own truncation error dominates. error : estimated relative error of x_f.
-    """
-
-    lam: float
-    w_f: float
-    gamma: float
-    R_x0: Array
-    x_f: Array
-    z_f: Array
-    tension: Array
-    nodes: NDArray[np.int64]
-    median: NDArray[np.bool_]
-    boundary_error: Array
-    error: Array
-
-    def __len__(self) -> int:
-        return len(self.R_x0)
+Integers = NDArray[np.int64]
+CABLE = ("lam", "w_f", "gamma")
 
 
 def equilibria(
@@ -57,7 +33,7 @@ def equilibria(
     C_f: float = 0.0,
     w: float = 1.0,
     C_t: float = 0.0,
-) -> Equilibria | DragEquilibria:
+) -> Equilibria:
     """Equilibria of a towed cable: all of them in a vacuum, those that a search finds in a fluid.
 
     Parameters
@@ -82,10 +58,8 @@ def equilibria(
     Returns
     -------
     Equilibria
-        In a vacuum, where the last five have their defaults: all of them, an odd number.
-    DragEquilibria
-        In a fluid: those that continuation from a vacuum and a search in the radius of the fish find. Completeness is
-        not proved; `searched` says what was searched.
+        In a vacuum, where the last five have their defaults: all of them, an odd number. In a fluid: those that
+        continuation from a vacuum and a search in the radius of the fish find; `searched` says what was searched.
 
     Raises
     ------
@@ -107,50 +81,101 @@ def equilibria(
 
     Examples
     --------
-    >>> [round(float(r), 3) for r in equilibria(37.8, 1352, 2.97).R_x0]
-    [-444837.738, 552.265, 469356.532]
+    >>> found = equilibria(37.8, 1352, 2.97)
+    >>> [round(float(r), 3) for r in found.R_x0], [str(name) for name in found.branch], found.expected
+    ([-444837.738, 552.265, 469356.532], ['1 outer', '1 inner', 'outward'], 1)
     >>> found = equilibria(37.8, 1352, 2.97, C=0.018)
-    >>> [round(float(r), 4) for r in found.r_f], [int(n) for n in found.nodes]
-    ([0.0435, 36.8139, 38.7821], [1, 1, 0])
+    >>> [round(float(r), 4) for r in found.r_f], [int(n) for n in found.nodes], found.expected
+    ([36.8139, 0.0435, 38.7821], [1, 1, 0], 1)
     """
-    lam, w_f, gamma = check_one("lam", lam), check_one("w_f", w_f, zero=True), check_one("gamma", gamma)
-    system = check_system(lam, w_f, C, m_f, C_f, w, C_t)
+    system = System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t)
+    return solve_equilibria(system, check_one("gamma", gamma))
+
+
+def solve_equilibria(system: System, gamma: float) -> Equilibria:
+    """Equilibria of a system already checked; see `equilibria`.
+
+    Parameters
+    ----------
+    system : System
+    gamma : float
+        Speed Omega sqrt(R/g) [-], > 0.
+
+    Returns
+    -------
+    Equilibria
+
+    Raises
+    ------
+    ArithmeticError
+        If the computation overflows, does not converge, or would take minutes (HALF_WAVES).
+    """
+    nodes, outer, found = _all_members(system, gamma)
+    branch = branch_names(nodes, outer)
     if not system.in_vacuum:
         # The vacuum of the report, m_f = w_f and w = 1, is where the equilibria are continued from.
-        return solve_drag_equilibria(system, gamma, np.abs(_all_members(w_f, lam, gamma)[1].x_f))
-    return vacuum_equilibria(lam, w_f, gamma)
-
-
-def vacuum_equilibria(lam: float, w_f: float, gamma: float) -> Equilibria:
-    """All equilibria in a vacuum; see `equilibria`."""
-    from towatlas.kernels.scan import forward_shots
-
-    lam, w_f, gamma = check_one("lam", lam), check_one("w_f", w_f, zero=True), check_one("gamma", gamma)
-    nodes, found = _all_members(w_f, lam, gamma)
+        return solve_drag_equilibria(system, gamma, np.abs(found.x_f), branch)
     order = np.argsort(found.R_x0)
-    nodes, x_f, z_f, error = nodes[order], found.x_f[order], found.z_f[order], found.error[order]
-    r_x0 = np.ascontiguousarray(found.R_x0[order])
+    r_x0, x_f = np.ascontiguousarray(found.R_x0[order]), found.x_f[order]
     rows = len(order)
-    witness, x_end, r_x_end = np.empty(rows), np.empty(rows), np.empty(rows)
-    cable = (np.full(rows, value) for value in (w_f, lam, gamma))
-    forward_shots(*cable, r_x0, WITNESS_SEGMENTS, witness, x_end, r_x_end, 0, rows)
     return Equilibria(
-        lam=lam,
-        w_f=w_f,
+        system=system,
         gamma=gamma,
         R_x0=r_x0,
+        R_y0=np.zeros(rows),
+        R_z0=np.full(rows, system.w_f + system.lam),
         x_f=x_f,
-        z_f=z_f,
-        tension=np.hypot(w_f + lam, r_x0),
-        nodes=nodes,
-        median=np.arange(rows) == rows // 2,
-        boundary_error=witness,
-        error=error,
+        y_f=np.zeros(rows),
+        z_f=found.z_f[order],
+        r_f=np.abs(x_f),
+        lag=np.where(x_f < 0.0, np.pi, 0.0),
+        tension=np.hypot(system.w_f + system.lam, r_x0),
+        nodes=nodes[order],
+        branch=branch[order],
+        expected=rows // 2,
+        error=found.error[order],
+        boundary_error=_boundary_errors(system, gamma, r_x0),
+        searched="all: as many as the zeros of the first variation say",
     )
 
 
-def solve_branch(branch: str, w_f: Array, lam: Array, gamma: Array) -> tuple[NDArray[np.int64], Members]:
+def branch_names(nodes: Integers, outer: NDArray[np.bool_]) -> NDArray[np.str_]:
+    """What the equilibria of a cable in a vacuum are called.
+
+    Parameters
+    ----------
+    nodes : ndarray of int, shape (equilibria,)
+    outer : ndarray of bool, shape (equilibria,)
+        Whether each is the member of its pair farther from the axis.
+
+    Returns
+    -------
+    ndarray of str, shape (equilibria,)
+        "outward", "n inner", "n outer".
+    """
+    names = [f"{n} {'outer' if o else 'inner'}" if n else "outward" for n, o in zip(nodes, outer, strict=True)]
+    return np.array(names, np.str_)
+
+
+def _boundary_errors(system: System, gamma: float, r_x0: Array) -> Array:
+    """E of Eq. (33) of forward shots: an independent witness."""
+    from towatlas.kernels.scan import forward_shots
+
+    rows = len(r_x0)
+    errors, x_end, r_x_end = np.empty(rows), np.empty(rows), np.empty(rows)
+    cable = (np.full(rows, value) for value in (system.lam, system.w_f, gamma))
+    forward_shots(*cable, r_x0, WITNESS_SEGMENTS, errors, x_end, r_x_end, 0, rows)
+    return errors
+
+
+def solve_branch(branch: str, *, lam: Array, w_f: Array, gamma: Array) -> tuple[NDArray[np.int64], Members]:
     """The outward or the median equilibrium of each row, solved directly; no checks.
+
+    Parameters
+    ----------
+    branch : {"outward", "median"}
+    lam, w_f, gamma : ndarray, shape (rows,)
+        Cable length, fish weight and speed [-].
 
     Returns
     -------
@@ -159,72 +184,82 @@ def solve_branch(branch: str, w_f: Array, lam: Array, gamma: Array) -> tuple[NDA
     """
     n = np.zeros(len(lam), np.int64)
     if branch == "median":
-        n = folds_passed(w_f, lam, gamma)
-    members = solve_members(w_f, lam, gamma, n, np.zeros(len(lam), bool), shoot_lanes)
+        n = folds_passed(w_f=w_f, lam=lam, gamma=gamma)
+    members = solve_members(lam=lam, w_f=w_f, gamma=gamma, n=n, outer=np.zeros(len(lam), bool), shoot=shoot_lanes)
     return n, members
 
 
-def folds_passed(w_f: Array, lam: Array, gamma: Array) -> NDArray[np.int64]:
-    """Number of critical speeds below gamma, for each row."""
+def folds_passed(*, lam: Array, w_f: Array, gamma: Array) -> NDArray[np.int64]:
+    """Number of critical speeds below gamma, for each row; no checks.
+
+    Parameters
+    ----------
+    lam, w_f, gamma : ndarray, shape (rows,)
+        Cable length, fish weight and speed [-].
+
+    Returns
+    -------
+    ndarray of int, shape (rows,)
+    """
     passed = np.zeros(len(lam), np.int64)
     rows = np.arange(len(lam))
     while len(rows):
         n = passed[rows] + 1
-        excess = unchecked_excess_length(lam[rows], w_f[rows], n)
-        states = solve_rows(n, w_f[rows], lam[rows], excess)
+        excess = unchecked_excess_length(lam=lam[rows], w_f=w_f[rows], n=n)
+        states = solve_rows(n=n, w_f=w_f[rows], lam=lam[rows], excess=excess)
         # One that rounding hides lies next to its threshold, beyond any speed.
         rows = rows[(states["status"] == status.OK) & (states["gamma"] < gamma[rows])]
         passed[rows] += 1
     return passed
 
 
-def _failure(lam: float, w_f: float, gamma: float, code: int) -> ArithmeticError:
-    return ArithmeticError(f"lam = {lam:g}, w_f = {w_f:g}, gamma = {gamma:g}: {status.SENTENCES[code]}")
+def _failure(system: System, gamma: float, code: int) -> ArithmeticError:
+    return ArithmeticError(f"lam = {system.lam:g}, w_f = {system.w_f:g}, gamma = {gamma:g}: {status.SENTENCES[code]}")
+
+
+def _highest(system: System, gamma: float) -> int:
+    """Highest pair of equilibria that one cable may have in a vacuum."""
+    # Extrema too low to reach gamma^2 are as many as the half waves of a straight cable, millions at high speeds: of
+    # those beyond the last n with a transition only one is looked for, as a check on the closed form.
+    lam, w_f = system.lam, system.w_f
+    half_waves = 2.0 / np.pi * gamma * lam / (np.sqrt(w_f + lam) + np.sqrt(w_f))
+    possible = float(np.ceil((lam + 1.0 - threshold_offset(w_f)) / 2.0))
+    if half_waves * (1.0 + 2.0 * min(possible, half_waves)) > HALF_WAVES:
+        raise _failure(system, gamma, status.STEP_LIMIT)
+    cable = (np.array([value]) for value in (lam, w_f, gamma))
+    highest, codes = extrema(**dict(zip(CABLE, cable, strict=True)), shoot=shoot_singly)
+    if codes[0] != status.OK:
+        raise _failure(system, gamma, int(codes[0]))
+    return min(int(highest[0]), int(possible))
 
 
 # What overflows becomes a status of the shots.
 @np.errstate(over="ignore", invalid="ignore")
-def _highest(w_f: float, lam: float, gamma: float) -> tuple[int, int]:
-    """Highest pair of equilibria that one cable may have, and a status."""
-    # Extrema too low to reach gamma^2 are as many as the half waves of a straight cable, millions at high speeds: of
-    # those beyond the last n with a transition only one is looked for, as a check on the closed form.
-    half_waves = 2.0 / np.pi * gamma * lam / (np.sqrt(w_f + lam) + np.sqrt(w_f))
-    possible = float(np.ceil((lam + 1.0 - threshold_offset(w_f)) / 2.0))
-    if half_waves * (1.0 + 2.0 * min(possible, half_waves)) > HALF_WAVES:
-        raise _failure(lam, w_f, gamma, status.STEP_LIMIT)
-    highest, codes = extrema(np.array([w_f]), np.array([lam]), np.array([gamma]), shoot_singly)
-    return min(int(highest[0]), int(possible)), int(codes[0])
-
-
-@np.errstate(over="ignore", invalid="ignore")
-def _all_members(w_f: float, lam: float, gamma: float) -> tuple[NDArray[np.int64], Members]:
-    """Nodes and states of all equilibria of one cable."""
-    last, code = _highest(w_f, lam, gamma)
-    if code != status.OK:
-        raise _failure(lam, w_f, gamma, code)
-    cable = np.array([w_f]), np.array([lam]), np.array([gamma])
+def _all_members(system: System, gamma: float) -> tuple[Integers, NDArray[np.bool_], Members]:
+    """Number of the pair, whether it is its outer member, and state of every equilibrium of one cable in a vacuum."""
+    last = _highest(system, gamma)
     shoot = shoot_singly if last <= FEW else shoot_lanes
 
-    def solve(n: NDArray[np.int64], outer: bool) -> Members:
-        w_f, lam, gamma = (np.full(len(n), column[0]) for column in cable)
-        return solve_members(w_f, lam, gamma, n, np.full(len(n), outer), shoot)
+    def solve(n: Integers, outer: bool) -> Members:
+        cables = (np.full(len(n), value) for value in (system.lam, system.w_f, gamma))
+        return solve_members(**dict(zip(CABLE, cables, strict=True)), n=n, outer=np.full(len(n), outer), shoot=shoot)
 
     n = np.arange(last + 1)
     inner = solve(n, False)
-    codes = inner.status
-    there = codes == status.OK
-    outer = solve(n[there & (n > 0)], True)
+    there = inner.status == status.OK
+    pairs = n[there & (n > 0)]
+    outer = solve(pairs, True)
     # A pair that is one member short is within rounding of its fold.
     codes = np.concatenate(
         [
-            codes[codes != status.NOT_FOUND],
+            inner.status[inner.status != status.NOT_FOUND],
             np.where(outer.status == status.NOT_FOUND, status.LOST_IN_ROUNDING, outer.status),
         ]
     )
     if (codes != status.OK).any():
-        raise _failure(lam, w_f, gamma, int(codes.max()))
-    nodes = np.concatenate([n[there], n[there & (n > 0)]])
+        raise _failure(system, gamma, int(codes.max()))
     columns = {
         name: np.concatenate([getattr(inner, name)[there], getattr(outer, name)]) for name in Members.__annotations__
     }
-    return nodes, Members(**columns)
+    is_outer = np.repeat([False, True], [int(there.sum()), len(pairs)])
+    return np.concatenate([n[there], pairs]), is_outer, Members(**columns)

@@ -1,6 +1,6 @@
 """Guesses for tables of critical states: solve a few cables from cold, interpolate the rest.
 
-The few are Chebyshev nodes of the box that the table fills in the coordinates of `towatlas.numerics.chebyshev`, one
+The few are Chebyshev nodes of the box that the table fills in the coordinates of the atlas, one
 box for each n; they are solved the same way, from fewer still.
 """
 
@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.kernels import status
-from towatlas.limits import unchecked_threshold_length
-from towatlas.numerics import chebyshev as interpolant
+from towatlas.limits import W_SCALE, unchecked_threshold_length
+from towatlas.numerics import chebyshev
 
 Array = NDArray[np.float64]
 
@@ -29,13 +29,13 @@ MOST_ROUNDING = 1e8
 
 
 def seed(
-    n: NDArray[np.int64], w_f: Array, lam: Array, excess: Array, solve: Callable[..., dict[str, NDArray[Any]]]
+    *, lam: Array, w_f: Array, n: NDArray[np.int64], excess: Array, solve: Callable[..., dict[str, NDArray[Any]]]
 ) -> tuple[Array, Array, Array]:
     """Guesses of (a, gamma) and their slopes, as `towatlas.kernels.folds.solve_folds` takes them.
 
     Parameters
     ----------
-    n, w_f, lam, excess : ndarray, shape (rows,)
+    lam, w_f, n, excess : ndarray, shape (rows,)
         The cables.
     solve : callable
         `towatlas.solve.critical.solve_rows`, for the nodes.
@@ -67,28 +67,28 @@ def _seed_one(n: int, w_f: Array, excess: Array, solve: Callable) -> tuple[Array
     """Guesses and slopes for rows of one n; None where no box of nodes pays or one of its nodes fails."""
     from towatlas.kernels.fold_predictor import SLOPES, seed_folds
 
-    x, y = np.log(excess), np.log1p(w_f / interpolant.W_SCALE)
+    x, y = np.log(excess), np.log1p(w_f / W_SCALE)
     span = _box(x, y)
     counts = _node_counts(span, len(w_f) / ROWS_A_NODE)
     if counts is None:
         return None
     node_x, node_y = (
-        0.5 * (low + high) + 0.5 * (high - low) * interpolant.nodes(count)
+        0.5 * (low + high) + 0.5 * (high - low) * chebyshev.nodes(count)
         for low, high, count in zip(span[::2], span[1::2], counts, strict=True)
     )
     node_w_f, node_excess = (
         np.ascontiguousarray(grid.ravel())
-        for grid in np.meshgrid(interpolant.W_SCALE * np.expm1(node_y), np.exp(node_x), indexing="ij")
+        for grid in np.meshgrid(W_SCALE * np.expm1(node_y), np.exp(node_x), indexing="ij")
     )
     threshold = unchecked_threshold_length(node_w_f, n)
-    nodes = solve(np.full(len(node_w_f), n), node_w_f, threshold + node_excess, node_excess)
+    nodes = solve(lam=threshold + node_excess, w_f=node_w_f, n=np.full(len(node_w_f), n), excess=node_excess)
     if (nodes["status"] != status.OK).any():
         return None
     log_gamma = np.log(nodes["gamma"])
     fields = np.log(np.abs(nodes["x_f"])) + 2.0 * log_gamma + np.log(node_excess), log_gamma + 0.5 * np.log(node_excess)
-    series = interpolant.coefficients(np.stack([field.reshape(len(node_y), len(node_x)) for field in fields]))
+    series = chebyshev.coefficients(np.stack([field.reshape(len(node_y), len(node_x)) for field in fields]))
     a, gamma, slopes = np.empty(len(w_f)), np.empty(len(w_f)), np.empty((len(w_f), SLOPES))
-    seed_folds(series, excess, w_f, span, interpolant.W_SCALE, a, gamma, slopes, 0, len(w_f))
+    seed_folds(series, w_f, excess, span, W_SCALE, a, gamma, slopes, 0, len(w_f))
     return a, gamma, slopes
 
 

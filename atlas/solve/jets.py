@@ -11,10 +11,18 @@ Monomial = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Jets:
-    """Monomials of a truncated polynomial algebra.
+    """Monomials of a truncated polynomial algebra in log r, log gamma and log C.
 
-    products : shape (products, 3), the factors and the result, sorted by the result, with the constant times the
-    result itself last of its kind. places : the monomials r, r^2, r^3, gamma and C, 0 where there is none.
+    Attributes
+    ----------
+    monomials : tuple of (int, int, int)
+        Exponents, lower degrees first.
+    products : ndarray of int, shape (products, 3)
+        The factors and the result, sorted by the result, with the constant times the result itself last of its kind.
+    places : ndarray of int, shape (5,)
+        The monomials r, r^2, r^3, gamma and C, 0 where there is none.
+    degree : int
+        Highest power of log r, >= 0.
     """
 
     monomials: tuple[Monomial, ...]
@@ -26,12 +34,44 @@ class Jets:
         return len(self.monomials)
 
     def at(self, *monomial: int) -> int:
-        """Index of a monomial."""
+        """Index of a monomial.
+
+        Parameters
+        ----------
+        *monomial : int
+            Exponents of log r, log gamma and log C.
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        ValueError
+            If it is not among them.
+        """
         return self.monomials.index(monomial)  # type: ignore[arg-type]
 
 
 def jets_of(degree: int, gamma: bool = False, drag: bool = False) -> Jets:
-    """Jets to a degree in log r, and to the first in log gamma and in log C (with r to one degree less)."""
+    """Jets to a degree in log r, and to the first in log gamma and in log C (with r to one degree less).
+
+    Parameters
+    ----------
+    degree : int
+        In log r, >= 0.
+    gamma, drag : bool
+        Whether log gamma and log C are among the unknowns.
+
+    Returns
+    -------
+    Jets
+
+    Examples
+    --------
+    >>> jets_of(1, gamma=True).monomials
+    ((0, 0, 0), (1, 0, 0), (0, 1, 0))
+    """
     monomials: list[Monomial] = [(k, 0, 0) for k in range(degree + 1)]
     monomials += [(k, 1, 0) for k in range(degree) if gamma]
     monomials += [(k, 0, 1) for k in range(degree) if drag]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.kernels import status
+from towatlas.numerics.rows import EPS
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -27,7 +28,6 @@ LINEAR = 1e-12
 BEYOND = 1.01
 ROUNDS = 200
 MAX_STEPS = 10**7
-EPS = 2.0**-52
 TINY = 1e-140
 # Steps in log a: one below this is made on the results instead of by another shot, the square of it being rounding.
 LAST_STEP = 1e-8
@@ -41,7 +41,23 @@ PARALLEL_FROM = 512
 
 @dataclass(frozen=True)
 class Members:
-    """One equilibrium a row: offset a = gamma^2 |x_f|; R_x0, x_f, z_f over the tow radius; error estimate of x_f."""
+    """Equilibria of cables in a vacuum, one a row; nan where status is not OK.
+
+    Attributes
+    ----------
+    a : ndarray, shape (rows,)
+        Offset of the fish gamma^2 |x_f| [-], > 0.
+    R_x0 : ndarray, shape (rows,)
+        Radial force of the cable at the tow point over (mu + rho A) g R [-].
+    x_f : ndarray, shape (rows,)
+        Radial position of the fish over tow radius [-].
+    z_f : ndarray, shape (rows,)
+        Depth of the fish over tow radius [-], 0 to lam.
+    error : ndarray, shape (rows,)
+        Estimated relative error of x_f [-], > 0.
+    status : ndarray of int, shape (rows,)
+        Codes of `towatlas.kernels.status`.
+    """
 
     a: Array
     R_x0: Array
@@ -52,7 +68,22 @@ class Members:
 
 
 def shoot_lanes(a: Array, mu: Array, tau: Array) -> tuple[Array, Integers, Integers]:
-    """Many shots at once, on all threads."""
+    """Many shots at once, on all threads if there are very many.
+
+    Parameters
+    ----------
+    a, mu, tau : ndarray, shape (rows,)
+        Offset of the fish, start of the shot and cable to pay out, lengths over g / Omega^2.
+
+    Returns
+    -------
+    ndarray, shape (rows, 6)
+        tau, f, p, z, v, q at the ends.
+    ndarray of int, shape (rows,)
+        Zeros of q passed.
+    ndarray of int, shape (rows,)
+        Statuses.
+    """
     from towatlas.kernels.lanes import END_COLUMNS, FOLD_COLUMNS, march
     from towatlas.kernels.sweeps import march_parallel
 
@@ -67,7 +98,18 @@ def shoot_lanes(a: Array, mu: Array, tau: Array) -> tuple[Array, Integers, Integ
 
 
 def shoot_singly(a: Array, mu: Array, tau: Array) -> tuple[Array, Integers, Integers]:
-    """A few shots, with the kernel that is compiled soonest."""
+    """A few shots, with the kernel that is compiled soonest.
+
+    Parameters
+    ----------
+    a, mu, tau : ndarray, shape (rows,)
+        As of `shoot_lanes`.
+
+    Returns
+    -------
+    tuple of ndarray
+        As of `shoot_lanes`.
+    """
     from towatlas.kernels.vacuum_single import shoot_each
 
     rows = len(a)
@@ -76,16 +118,32 @@ def shoot_singly(a: Array, mu: Array, tau: Array) -> tuple[Array, Integers, Inte
     return ends, counts, statuses
 
 
-def extrema(w_f: Array, lam: Array, gamma: Array, shoot: Shoot) -> tuple[Integers, Integers]:
-    """Number of extrema of p(t_e; a), which bounds that of the folds passed; and statuses."""
+def extrema(*, lam: Array, w_f: Array, gamma: Array, shoot: Shoot) -> tuple[Integers, Integers]:
+    """Number of extrema of p(t_e; a), which bounds that of the folds passed.
+
+    Parameters
+    ----------
+    lam, w_f, gamma : ndarray, shape (rows,)
+        Cable length, fish weight and speed [-].
+    shoot : callable
+        `shoot_lanes` or `shoot_singly`.
+
+    Returns
+    -------
+    ndarray of int, shape (rows,)
+        The numbers.
+    ndarray of int, shape (rows,)
+        Statuses.
+    """
     gamma2 = gamma * gamma
     _, counts, statuses = shoot(LINEAR * np.minimum(1.0, gamma2), gamma2 * w_f, gamma2 * lam)
     return counts, statuses
 
 
 def solve_members(
-    w_f: Array,
+    *,
     lam: Array,
+    w_f: Array,
     gamma: Array,
     n: Integers,
     outer: NDArray[np.bool_],
@@ -96,7 +154,7 @@ def solve_members(
 
     Parameters
     ----------
-    w_f, lam, gamma : ndarray, shape (rows,)
+    lam, w_f, gamma : ndarray, shape (rows,)
     n : ndarray of int, shape (rows,)
     outer : ndarray of bool, shape (rows,)
         Which member; False for n = 0.

@@ -1,206 +1,228 @@
-"""Answers from an atlas file. Needs numpy and netCDF4 only."""
+"""Critical states interpolated from an atlas. Needs numpy and netCDF4 only.
 
-import os
-import sys
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
+Chebyshev series in coordinates in which the critical states are smooth to both ends of the domain:
+
+    x = log(lambda - lambda_cn),  y = log(1 + w_f / W_SCALE)
+    log(gamma sqrt(lambda - lambda_cn)),  log(-R_x0),  log|x_f|,  log z_f
+
+gamma grows as (lambda - lambda_cn)^(-1/2) at the threshold and every quantity is a power of lambda far from it.
+"""
+
+from dataclasses import dataclass
 from typing import Any
 
-import netCDF4
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from towatlas.checks import check_broadcast, check_order, check_outside, check_real
 from towatlas.kernels import status
-from towatlas.limits import unchecked_excess_length, unchecked_threshold_length
-from towatlas.nomenclature import SYMBOLS
-from towatlas.numerics import chebyshev as interpolant
-from towatlas.solve.critical import CriticalStates, solve_rows
-from towatlas.tables.seal import AtlasFileError, read_sealed
+from towatlas.limits import W_SCALE, unchecked_excess_length, unchecked_threshold_length
+from towatlas.numerics import chebyshev
+from towatlas.numerics.axes import LogAxis, ShiftedLogAxis
+from towatlas.numerics.errormap import block_of
+from towatlas.tables import direct
+from towatlas.tables.domain import complaint
 
-SCHEMA_VERSION = 1
+METHOD = "fold"
 INTERPOLANT = "support/interpolant"  # the group of the series
+FIELDS = ("gamma", "R_x0", "x_f", "z_f")
+QUANTITIES = (*FIELDS, "tension", "error", "status")
 EPS = np.finfo(float).eps
 MOST_SLACK = 1e-6
-ROUNDINGS = 48.0  # as in towatlas.kernels.folds, whose import would bring numba (test_error_constants_agree)
-
-QUANTITIES = ("gamma", "R_x0", "x_f", "z_f", "tension", "error", "status")
+ROUNDINGS = 48.0  # as in kernels.folds, whose import would bring numba (test_error_constants_agree)
 
 Array = NDArray[np.float64]
-
-_NETCDF = threading.Lock()
-
-
-def default_path() -> Path:
-    """The atlas used when none is named: $TOWATLAS_FILE, else build/atlas.nc."""
-    return Path(os.environ.get("TOWATLAS_FILE", "build/atlas.nc"))
+Integers = NDArray[np.int64]
 
 
-def _dataset(path: Path, data: bytes) -> netCDF4.Dataset:
-    try:
-        file = netCDF4.Dataset(path.name, memory=data)
-    except (OSError, RuntimeError) as error:
-        raise AtlasFileError(f"{path} is not a readable NetCDF-4 file: {error}") from None
-    file.set_auto_mask(False)
-    return file
+@dataclass(frozen=True)
+class CriticalAxes:
+    """The domain of the series and its axes.
+
+    Attributes
+    ----------
+    excess : LogAxis
+        Of lambda - lambda_cn [-], > 0.
+    w_f : ShiftedLogAxis
+        Of the weight of the fish [-], from 0.
+    """
+
+    excess: LogAxis
+    w_f: ShiftedLogAxis
+
+    @classmethod
+    def over(cls, excess_min: float, excess_max: float, w_f_max: float) -> "CriticalAxes":
+        """Axes that end there.
+
+        Parameters
+        ----------
+        excess_min, excess_max, w_f_max : float
+            Ends [-], > 0.
+
+        Returns
+        -------
+        CriticalAxes
+        """
+        return cls(LogAxis(excess_min, excess_max), ShiftedLogAxis(w_f_max, W_SCALE))
+
+    def hold(self, excess: Array, w_f: Array, slack: Array) -> NDArray[np.bool_]:
+        """Whether points lie in the domain.
+
+        Parameters
+        ----------
+        excess, w_f : ndarray, shape (points,)
+            lambda - lambda_cn and fish weight [-].
+        slack : ndarray, shape (points,)
+            Rounding of lambda, as a share of the excess, that is let pass at the ends.
+
+        Returns
+        -------
+        ndarray of bool, shape (points,)
+        """
+        inside = (excess >= self.excess.low * (1.0 - slack)) & (excess <= self.excess.high * (1.0 + slack))
+        return inside & (w_f >= 0.0) & (w_f <= self.w_f.high)
 
 
-@contextmanager
-def open_group(path: Path, data: bytes) -> Iterator[netCDF4.Dataset]:
-    """The file whose bytes these are, for reading at once: the NetCDF library is not safe to call from two threads."""
-    with _NETCDF, _dataset(path, data) as file:
-        yield file
-
-
-def read_root(path: Path) -> tuple[dict[str, Any], bytes, str]:
-    """Global attributes, bytes and seal of any towatlas file, an atlas or a plain table; errors as `open_atlas`."""
-    data, seal = read_sealed(path)
-    with open_group(path, data) as file:
-        attributes = {name: file.getncattr(name) for name in file.ncattrs()}
-    version = attributes.get("schema_version")
-    if version is None:
-        raise AtlasFileError(f"{path} is not an atlas: it has no schema_version")
-    if version > SCHEMA_VERSION:
-        raise AtlasFileError(
-            f"{path} has schema version {version}, this towatlas reads up to {SCHEMA_VERSION}; upgrade towatlas"
-        )
-    return attributes, data, seal
-
-
-def open_atlas(path: str | os.PathLike | None = None) -> "Atlas":
-    """Open an atlas file and check that it is whole.
+def to_field(name: str, value: Array, excess: Array) -> Array:
+    """The smooth function that is interpolated, from a critical state.
 
     Parameters
     ----------
-    path : path, optional
-        The file; without it $TOWATLAS_FILE, else build/atlas.nc.
+    name : str
+        One of FIELDS.
+    value, excess : ndarray
+        The quantity, and lambda - lambda_cn [-].
 
     Returns
     -------
-    Atlas
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    AtlasFileError
-        If the file is damaged (a single changed bit is noticed), is no atlas, or was written by a newer version.
-
-    Examples
-    --------
-    >>> atlas = open_atlas()                                    # doctest: +SKIP
-    >>> float(atlas.critical_speed(37.8, 1352, n=2))            # doctest: +SKIP
-    3.41756706...
+    ndarray
+        Its logarithm, of gamma that of gamma sqrt(lambda - lambda_cn).
     """
-    return Atlas(default_path() if path is None else Path(path))
+    return np.log(np.abs(value)) + (0.5 * np.log(excess) if name == "gamma" else 0.0)
 
 
-class Atlas:
-    """Critical states of the vacuum problem, interpolated from an atlas file. Made by `open_atlas`.
+def from_field(name: str, field: Array, excess: Array, n: Integers) -> Array:
+    """A critical state, from the smooth function: R_x0 is negative, x_f has the sign of (-1)^n (its nodes).
 
-    The methods `critical_speed`, `reaction`, `fish_offset`, `fish_depth`, `tow_tension`, `error` and `status` take
-    (lam, w_f, n=1, outside="raise"), scalars, arrays that broadcast or xarray DataArrays, and return one quantity;
-    `states` takes scalars and plain arrays and returns all of them. Safe to share between threads.
+    Parameters
+    ----------
+    name : str
+        One of FIELDS.
+    field, excess : ndarray, shape (points,)
+        The function, and lambda - lambda_cn [-].
+    n : ndarray of int, shape (points,)
 
-    lam : cable length over tow radius [-]; w_f : fish weight [-]; n : number of the transition.
-    outside : what becomes of points the table does not hold (too close to the threshold, too long a cable, too heavy
-    a fish, n beyond the table, nan): "raise" a ValueError that names the axis, the value and the limits; "nan", with
-    the reason in the status; or "solve" them directly. Nothing is ever extrapolated. A cable no longer than lambda_cn
-    has no n-th transition: the answer is nan, its status NO_TRANSITION.
+    Returns
+    -------
+    ndarray, shape (points,)
+    """
+    value = np.exp(field)
+    if name == "gamma":
+        return value / np.sqrt(excess)
+    if name == "R_x0":
+        return -value
+    if name == "x_f":
+        return np.where(n % 2 == 0, value, -value)
+    return value
+
+
+class CriticalTable:
+    """The part of an atlas that holds critical states. Safe to share between threads.
+
+    Attributes
+    ----------
+    axes : CriticalAxes
+        The domain.
+    n_max : int
+        Highest transition held, >= 1.
     """
 
-    def __init__(self, path: Path):
-        self.path = path
-        self.attributes, data, self.sha256 = read_root(path)
-        if self.attributes.get("method") != "fold":
-            raise AtlasFileError(
-                f"{path} was built with --method {self.attributes.get('method')} and holds a plain table only; "
-                "lookup needs an atlas built with --method fold"
-            )
-        with open_group(path, data) as file:
-            group = file[INTERPOLANT]
-            self.axes = interpolant.Axes(
-                excess_min=float(group.excess_min), excess_max=float(group.excess_max), w_f_max=float(group.w_f_max)
-            )
-            self._series: dict[str, Array] = {
-                name: np.asarray(group[f"{name}_series"][:], np.float64) for name in interpolant.FIELDS
-            }
-            self._error_map: Array = np.asarray(group["gamma_error"][:], np.float64)
-        self.n_max = len(self._error_map)
-        self._patches: dict[str, dict[int, Array]] = {name: {} for name in interpolant.FIELDS}
+    holds = "critical speeds"
+    made_by = "towatlas build"
 
-    def states(self, lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1, outside: str = "raise") -> CriticalStates:
-        """All quantities of the critical states, with error estimate and status; see the class for the parameters."""
-        check_outside(outside)
-        lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
-        flat = n.ravel(), w_f.ravel(), lam.ravel()
-        table = self._answer(*flat, outside, QUANTITIES)
-        return CriticalStates(
-            n=n, lam=lam, w_f=w_f, **{name: column.reshape(n.shape) for name, column in table.items()}
+    def __init__(self, file: Any):
+        group = file[INTERPOLANT]
+        self.axes = CriticalAxes.over(
+            *(float(getattr(group, name)) for name in ("excess_min", "excess_max", "w_f_max"))
         )
+        self._series = {name: np.asarray(group[f"{name}_series"][:], np.float64) for name in FIELDS}
+        self._error: Array = np.asarray(group["gamma_error"][:], np.float64)
+        self.n_max = len(self._error)
+        self._patches: dict[str, dict[int, Array]] = {name: {} for name in FIELDS}
 
-    def critical_speed(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
-        """Critical speed gamma_cn = Omega sqrt(R/g) [-]; relative error estimate: `error`."""
-        return self._quantity("gamma", lam, w_f, n, outside)
+    @staticmethod
+    def in_file(file: Any, method: str) -> bool:
+        """Whether a file holds this part.
 
-    def reaction(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
-        """Radial reaction at the tow point R_x0^cn [-], over (mu + rho A) g R; negative."""
-        return self._quantity("R_x0", lam, w_f, n, outside)
+        Parameters
+        ----------
+        file : netCDF4.Dataset
+        method : str
+            How it was built, its attribute.
 
-    def fish_offset(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
-        """Radial position of the fish x_f [-], over the tow radius."""
-        return self._quantity("x_f", lam, w_f, n, outside)
+        Returns
+        -------
+        bool
+        """
+        return method == METHOD
 
-    def fish_depth(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
-        """Depth of the fish z_f [-], over the tow radius."""
-        return self._quantity("z_f", lam, w_f, n, outside)
+    def domain(self) -> dict[str, str]:
+        """Ranges of what is held, in words.
 
-    def tow_tension(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
-        """Cable tension at the tow point [-], over (mu + rho A) g R."""
-        return self._quantity("tension", lam, w_f, n, outside)
+        Returns
+        -------
+        dict of str
+            By quantity.
+        """
+        return {
+            "n": f"1 .. {self.n_max}",
+            "w_f": f"0 .. {self.axes.w_f.high:g}",
+            "lam - lambda_c": f"{self.axes.excess.low:g} .. {self.axes.excess.high:g}",
+        }
 
-    def error(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
-        """Estimated relative error of the critical speed [-]."""
-        return self._quantity("error", lam, w_f, n, outside)
-
-    def status(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
-        """Status codes, `towatlas.kernels.status`."""
-        return self._quantity("status", lam, w_f, n, outside)
-
-    def _quantity(self, name: str, lam: Any, w_f: Any, n: Any, outside: str) -> Any:
-        def plain(lam: Any, w_f: Any, n: Any) -> Any:
-            check_outside(outside)
-            lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
-            return self._answer(n.ravel(), w_f.ravel(), lam.ravel(), outside, (name,))[name].reshape(n.shape)[()]
-
-        return _with_xarray(plain, name, lam, w_f, n)
-
-    def _answer(
-        self, n: NDArray[np.int64], w_f: Array, lam: Array, outside: str, names: tuple[str, ...]
+    def answer(
+        self, names: tuple[str, ...], outside: str, *, lam: Array, w_f: Array, n: Integers
     ) -> dict[str, NDArray[Any]]:
-        """The quantities named, with status, of checked rows."""
+        """The quantities named, with status, of checked rows.
+
+        Parameters
+        ----------
+        names : tuple of str
+            Some of QUANTITIES.
+        outside : {"raise", "nan", "solve"}
+            What becomes of points outside.
+        lam, w_f : ndarray, shape (points,)
+            Cable length and fish weight [-].
+        n : ndarray of int, shape (points,)
+
+        Returns
+        -------
+        dict of ndarray, shape (points,)
+
+        Raises
+        ------
+        ValueError
+            For points outside with outside="raise".
+        """
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            excess = unchecked_excess_length(lam, w_f, n)
+            excess = unchecked_excess_length(lam=lam, w_f=w_f, n=n)
             sound = np.isfinite(lam) & np.isfinite(w_f) & (lam > 0.0) & (w_f >= 0.0)
             absent = sound & (excess <= 0.0)
             # Capped: next to the threshold rounding is all there is of the excess, and would let anything pass.
             slack = np.minimum(4.0 * EPS * (1.0 + np.abs(lam / excess)), MOST_SLACK)
-            inside = sound & ~absent & self.axes.holds(excess, w_f, slack) & (n <= self.n_max)
+            inside = sound & ~absent & self.axes.hold(excess, w_f, slack) & (n <= self.n_max)
         codes = np.full(len(n), status.OUTSIDE, np.int8)
         codes[~sound] = status.BAD_INPUT
         codes[absent] = status.NO_TRANSITION
         codes[inside] = status.OK
         unanswered = ~(inside | absent)
         if outside == "raise" and unanswered.any():
-            raise ValueError(self._complaint(n, w_f, lam, unanswered))
+            raise ValueError(self._complaint(unanswered, lam=lam, w_f=w_f, n=n))
         table: dict[str, NDArray[Any]] = {name: np.full(len(n), np.nan) for name in names if name != "status"}
-        self._interpolate(table, inside, n, w_f, lam, excess)
+        self._interpolate(table, inside, excess, lam=lam, w_f=w_f, n=n)
         table["status"] = codes
         again = unanswered & sound
         if outside == "solve" and again.any():
-            solved = solve_rows(n[again], w_f[again], lam[again], excess[again])
+            solved = direct.critical_states(lam=lam[again], w_f=w_f[again], n=n[again], excess=excess[again])
             for name in table:
                 table[name][again] = solved[name]
         return table
@@ -209,80 +231,58 @@ class Atlas:
         self,
         table: dict[str, NDArray[Any]],
         inside: NDArray[np.bool_],
-        n: NDArray[np.int64],
-        w_f: Array,
-        lam: Array,
         excess: Array,
+        *,
+        lam: Array,
+        w_f: Array,
+        n: Integers,
     ) -> None:
         n, w_f, lam, excess = n[inside], w_f[inside], lam[inside], excess[inside]
         if not len(n):
             return
-        x, y = self.axes.x(excess), self.axes.y(w_f)
-        fields = [name for name in interpolant.FIELDS if name in table or (name == "R_x0" and "tension" in table)]
-        sums = interpolant.evaluate([self._patches_of(name, n) for name in fields], n, x, y) if fields else []
-        values = {
-            name: interpolant.from_field(name, field, excess, n) for name, field in zip(fields, sums, strict=True)
-        }
+        x, y = self.axes.excess.coordinate(excess), self.axes.w_f.coordinate(w_f)
+        fields = [name for name in FIELDS if name in table or (name == "R_x0" and "tension" in table)]
+        sums = chebyshev.patch_sums([self._patches_of(name, n) for name in fields], n, x, y) if fields else []
+        values = {name: from_field(name, field, excess, n) for name, field in zip(fields, sums, strict=True)}
         if "tension" in table:
             values["tension"] = np.hypot(w_f + lam, values["R_x0"])
         if "error" in table:
-            blocks = self._error_map.shape[1:]
-            at = [
-                np.minimum((0.5 * (c + 1.0) * count).astype(int), count - 1)
-                for c, count in zip((y, x), blocks, strict=True)
-            ]
-            values["error"] = self._error_map[n - 1, at[0], at[1]] + ROUNDINGS * EPS * (1.0 + lam / excess)
+            at = (block_of(c, count) for c, count in zip((y, x), self._error.shape[1:], strict=True))
+            values["error"] = self._error[n - 1, *at] + ROUNDINGS * EPS * (1.0 + lam / excess)
         for name in table.keys() & values.keys():
             table[name][inside] = values[name]
 
     def series(self, name: str, n: int) -> Array:
-        """Chebyshev coefficients, shape (w_f degree, excess degree), of one quantity."""
+        """Chebyshev coefficients of one quantity.
+
+        Parameters
+        ----------
+        name : str
+            One of FIELDS.
+        n : int
+            1 to n_max.
+
+        Returns
+        -------
+        ndarray, shape (w_f degree, excess degree)
+        """
         return self._series[name][n - 1]
 
-    def _patches_of(self, name: str, n: NDArray[np.int64]) -> dict[int, Array]:
+    def _patches_of(self, name: str, n: Integers) -> dict[int, Array]:
         """Patches of a field, made for each n when first asked for; two threads at once make the same."""
         made = self._patches[name]
         for order in range(int(n.min()), int(n.max()) + 1):
             if order not in made:
-                made[order] = interpolant.patches(self.series(name, order))
+                made[order] = chebyshev.patches(self.series(name, order))
         return made
 
-    def _complaint(self, n: NDArray[np.int64], w_f: Array, lam: Array, bad: NDArray[np.bool_]) -> str:
-        """What is wrong with the first unanswered point, and how many there are."""
-        remedy = '; outside="solve" computes such points directly, outside="nan" leaves them out'
-        i = int(np.flatnonzero(bad)[0])
-        axes = self.axes
-        if not (np.isfinite(lam[i]) and lam[i] > 0.0):
-            reason = f"lam = {lam[i]:.15g} is not finite and positive"
-            remedy = '; outside="nan" leaves such points out'
-        elif not (np.isfinite(w_f[i]) and w_f[i] >= 0.0):
-            reason = f"w_f = {w_f[i]:.15g} is not finite, or negative"
-            remedy = '; outside="nan" leaves such points out'
-        elif w_f[i] > axes.w_f_max:
-            reason = f"w_f = {w_f[i]:.15g} is outside the atlas, 0 to {axes.w_f_max:g}"
-        elif n[i] > self.n_max:
-            reason = f"n = {n[i]} is outside the atlas, 1 to {self.n_max}"
-        else:
+    def _complaint(self, bad: NDArray[np.bool_], *, lam: Array, w_f: Array, n: Integers) -> str:
+        def too_short_or_long(i: int) -> str:
             threshold = float(unchecked_threshold_length(w_f[i], n[i]))
-            reason = (
+            return (
                 f"lam = {lam[i]:.15g} is outside the atlas: for n = {n[i]}, w_f = {w_f[i]:.15g} it holds lam from "
-                f"{threshold + axes.excess_min:.10g} to {threshold + axes.excess_max:.10g}"
+                f"{threshold + self.axes.excess.low:.10g} to {threshold + self.axes.excess.high:.10g}"
             )
-        others = f" ({bad.sum()} of {len(bad)} points are outside)" if len(bad) > 1 else ""
-        return reason + others + remedy
 
-
-def _with_xarray(plain: Callable, name: str, lam: Any, w_f: Any, n: Any) -> Any:
-    """Apply a function of arrays to arguments some of which may be xarray objects; then the result is one too."""
-    # Whoever passes an xarray object has imported xarray: no need to import it to find out.
-    xarray = sys.modules.get("xarray")
-    labelled = [value for value in (lam, w_f, n) if hasattr(value, "dims")]
-    if xarray is None or not labelled:
-        return plain(lam, w_f, n)
-    if not all(isinstance(value, xarray.DataArray) for value in labelled):
-        raise ValueError("labelled arguments must be xarray DataArrays; take one variable out of a Dataset")
-    result = xarray.apply_ufunc(plain, lam, w_f, n)
-    symbol = SYMBOLS[name]
-    result.name = symbol.name
-    result.attrs = {"long_name": symbol.long_name, "units": "1"}
-    return result
+        limits = {"w_f": (0.0, self.axes.w_f.high), "n": (1, self.n_max)}
+        return complaint({"lam": lam, "w_f": w_f, "n": n}, limits, bad, too_short_or_long)

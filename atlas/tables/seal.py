@@ -33,7 +33,22 @@ def _digest(data: bytes, at: int) -> str:
 
 
 def write_seal(path: Path) -> str:
-    """Fill in the blank seal of a closed file; returns the digest."""
+    """Fill in the blank seal of a closed file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    str
+        The digest.
+
+    Raises
+    ------
+    AtlasFileError
+        If there is not one blank seal in it.
+    """
     data = path.read_bytes()
     at = _digits_at(data)
     if at < 0:
@@ -49,6 +64,15 @@ def write_seal(path: Path) -> str:
 
 def read_sealed(path: Path) -> tuple[bytes, str]:
     """All bytes of a file whose seal is unbroken, and the digest.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    data : bytes
+    seal : str
 
     Raises
     ------
@@ -80,7 +104,17 @@ def read_sealed(path: Path) -> tuple[bytes, str]:
 
 
 def check_writable(path: Path) -> None:
-    """Raise AtlasFileError unless a file can be put at `path`; makes its folder."""
+    """Make sure that a file can be put somewhere; makes its folder.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    AtlasFileError
+        If it can not.
+    """
     if path.is_dir():
         raise AtlasFileError(f"{path} is a folder; name a file in it")
     try:
@@ -97,6 +131,14 @@ def written_in_place(path: Path) -> Iterator[Path]:
 
     The file at `path` is at any moment the old one or the new one, whole: a writer that fails or is killed leaves the
     old one, two at once leave that of the last to finish.
+
+    Parameters
+    ----------
+    path : Path
+
+    Yields
+    ------
+    Path
     """
     path = path.absolute()
     path.parent.mkdir(parents=True, exist_ok=True)

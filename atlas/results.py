@@ -1,0 +1,225 @@
+"""What the program answers with. Arrays of one answer have one shape; all numbers are dimensionless unless said."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from towatlas.kernels import status as codes
+from towatlas.system import System
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class CriticalStates:
+    """Critical states of towed cables in a vacuum; arrays of one shape, that of what was asked.
+
+    Attributes
+    ----------
+    n : ndarray of int, shape (...)
+        Number of the transition [-], >= 1.
+    lam : ndarray, shape (...)
+        Length of the cable over tow radius [-], > 0.
+    w_f : ndarray, shape (...)
+        Weight of the fish over (mu + rho A) g R [-], >= 0.
+    gamma : ndarray, shape (...)
+        Critical speed Omega sqrt(R/g) [-], > 0; nan, as all that follow, where status is not OK.
+    R_x0 : ndarray, shape (...)
+        Radial force of the cable at the tow point over (mu + rho A) g R [-], < 0.
+    x_f : ndarray, shape (...)
+        Radial position of the fish over tow radius [-], with the sign of (-1)^n.
+    z_f : ndarray, shape (...)
+        Depth of the fish below the tow point over tow radius [-], 0 to lam.
+    tension : ndarray, shape (...)
+        At the tow point, over (mu + rho A) g R [-], > 0.
+    error : ndarray, shape (...)
+        Estimated relative error of gamma [-], > 0.
+    status : ndarray of int8, shape (...)
+        Codes of `towatlas.kernels.status`; `sentence` puts them in words.
+    """
+
+    n: Integers
+    lam: Array
+    w_f: Array
+    gamma: Array
+    R_x0: Array
+    x_f: Array
+    z_f: Array
+    tension: Array
+    error: Array
+    status: NDArray[np.int8]
+
+    def sentence(self, index: Any = ()) -> str:
+        """The status of one state in words.
+
+        Parameters
+        ----------
+        index : int or tuple of int
+            Which state; none for answers of shape ().
+
+        Returns
+        -------
+        str
+        """
+        return codes.SENTENCES[int(self.status[index])]
+
+
+@dataclass(frozen=True)
+class Equilibria:
+    """Equilibria of one cable at one speed in any medium, in rising order of R_x0.
+
+    The tow point is at (1, 0, 0) and moves along y; z points down. In a vacuum everything lies in the plane y = 0.
+
+    Attributes
+    ----------
+    system : System
+        The cable, its fish and the medium.
+    gamma : float
+        Speed Omega sqrt(R/g) [-], > 0.
+    R_x0, R_y0, R_z0 : ndarray, shape (equilibria,)
+        Force of the cable at the tow point, pointing down it, over (mu + rho A) g R [-].
+    x_f, y_f, z_f : ndarray, shape (equilibria,)
+        Position of the fish over tow radius [-].
+    r_f : ndarray, shape (equilibria,)
+        Distance of the fish from the axis over tow radius [-], 0 to 1 + lam.
+    lag : ndarray, shape (equilibria,)
+        Angle of the fish behind the tow point [rad], -pi to pi; 0 or pi in a vacuum.
+    tension : ndarray, shape (equilibria,)
+        At the tow point, over (mu + rho A) g R [-], > 0.
+    nodes : ndarray of int, shape (equilibria,)
+        Sign changes of x along the cable [-], >= 0.
+    branch : ndarray of str, shape (equilibria,)
+        In a vacuum "outward" for the shape without nodes, "n inner" and "n outer" for the members of the n-th pair.
+        With drag that of the shape in a vacuum from which it is continued, else "drag k", counted from the axis
+        outwards.
+    expected : int
+        Row of the shape that is expected to be seen: in a vacuum the median root, after NRL Report 7048; with drag the
+        one whose fish is nearest to the axis, which the median root becomes. -1 if none can be named.
+    error : ndarray, shape (equilibria,)
+        Estimated relative error of r_f [-], > 0.
+    boundary_error : ndarray, shape (equilibria,)
+        E of Eq. (33) of a forward Runge-Kutta shot with this R_x0 over (mu + rho A) g R [-], an independent witness in
+        which its own truncation error dominates; nan with drag, where there is no such shot.
+    searched : str
+        What was searched, and whether the list is complete.
+    """
+
+    system: System
+    gamma: float
+    R_x0: Array
+    R_y0: Array
+    R_z0: Array
+    x_f: Array
+    y_f: Array
+    z_f: Array
+    r_f: Array
+    lag: Array
+    tension: Array
+    nodes: Integers
+    branch: NDArray[np.str_]
+    expected: int
+    error: Array
+    boundary_error: Array
+    searched: str
+
+    def __len__(self) -> int:
+        return len(self.R_x0)
+
+
+@dataclass(frozen=True)
+class FishPositions:
+    """Where the fish is on one branch of the equilibria in a vacuum; arrays of one shape, that of what was asked.
+
+    Attributes
+    ----------
+    lam : ndarray, shape (...)
+        Length of the cable over tow radius [-], > 0.
+    w_f : ndarray, shape (...)
+        Weight of the fish over (mu + rho A) g R [-], >= 0.
+    gamma : ndarray, shape (...)
+        Speed Omega sqrt(R/g) [-], > 0.
+    nodes : ndarray of int, shape (...)
+        Number of nodes of the shape [-], >= 0; -1 where status is not OK.
+    x_f, z_f : ndarray, shape (...)
+        Position of the fish over tow radius [-]; nan where status is not OK.
+    error : ndarray, shape (...)
+        Estimated relative error of x_f and z_f [-], > 0; nan where status is not OK.
+    status : ndarray of int8, shape (...)
+        Codes of `towatlas.kernels.status`.
+    interpolated : ndarray of bool, shape (...)
+        Whether the answer comes from the table; else it was solved directly.
+    """
+
+    lam: Array
+    w_f: Array
+    gamma: Array
+    nodes: Integers
+    x_f: Array
+    z_f: Array
+    error: Array
+    status: NDArray[np.int8]
+    interpolated: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class DragFolds:
+    """Folds of towed cables in a nondense fluid; arrays of one shape, that of what was asked.
+
+    nan where a status says why.
+
+    Attributes
+    ----------
+    n : ndarray of int, shape (...)
+        Number of the transition in a vacuum [-], >= 1.
+    lam : ndarray, shape (...)
+        Length of the cable over tow radius [-], > 0.
+    w_f : ndarray, shape (...)
+        Weight of the fish over (mu + rho A) g R [-], >= 0.
+    C : ndarray, shape (...)
+        Drag constant of the cable [-], >= 0.
+    appears : ndarray, shape (...)
+        Speed at which the n-th pair of equilibria appears [-], > 0.
+    r_f_appears : ndarray, shape (...)
+        Distance of the fish from the axis there, over tow radius [-], > 0.
+    ends : ndarray, shape (...)
+        Speed at which the outer member of the pair meets another equilibrium and is gone [-], > `appears`.
+    r_f_ends : ndarray, shape (...)
+        Distance of the fish from the axis there, over tow radius [-], > 0.
+    C_cusp : ndarray, shape (...)
+        C*_n, the drag constant above which there is no n-th pair [-], > 0.
+    gamma_cusp : ndarray, shape (...)
+        Speed at the cusp [-], > 0.
+    C_lasting : ndarray, shape (...)
+        Drag constant below which the pair does not end, as far as it was looked [-], > 0; nan where looked up.
+    error : ndarray, shape (...)
+        Estimated relative error of `appears` and `ends` [-], > 0.
+    error_cusp : ndarray, shape (...)
+        Estimated relative error of C_cusp [-], > 0.
+    status, status_ends, status_cusp : ndarray of int8, shape (...)
+        Codes of `towatlas.kernels.status` of `appears`, `ends` and `C_cusp`.
+    """
+
+    n: Integers
+    lam: Array
+    w_f: Array
+    C: Array
+    appears: Array
+    r_f_appears: Array
+    ends: Array
+    r_f_ends: Array
+    C_cusp: Array
+    gamma_cusp: Array
+    C_lasting: Array
+    error: Array
+    error_cusp: Array
+    status: NDArray[np.int8]
+    status_ends: NDArray[np.int8]
+    status_cusp: NDArray[np.int8]
+
+    def sentence(self, index: Any = (), of: str = "appears") -> str:
+        """The status of one fold in words: of `appears`, of `ends` or of the `cusp`."""
+        column = {"appears": self.status, "ends": self.status_ends, "cusp": self.status_cusp}[of]
+        return codes.SENTENCES[int(column[index])]

@@ -1,0 +1,336 @@
+"""The least of the models of the report's Table 1 that answers for a scene.
+
+A model is kept if its answers are those of every larger one within the scene's tolerance. The next larger one alone
+would not do: to a cable towed slowly in water drag adds nothing, buoyancy much.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite, isnan, nan
+
+import numpy as np
+
+from towatlas.kernels import status
+from towatlas.scene.models import QUESTIONS, ModelAnswer, check_questions, solvable_models, solve_model
+from towatlas.scene.pairs import ABSENT, PairSpeeds
+from towatlas.scene.scene import Scene, check_model
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One quantity by two models.
+
+    Attributes
+    ----------
+    smaller, larger : str
+        The models, of MODELS.
+    question : str
+        One of QUESTIONS.
+    quantity : str
+        In words.
+    unit : str
+        Of the values: "m", "N", "m/s"; empty for whole numbers.
+    by_smaller, by_larger : float
+        The values; of a position its distance from the tow point. nan where a status says why.
+    relative : float
+        Their difference [-], >= 0; nan where none can be given.
+    agrees : bool
+        Within the tolerance. Whole numbers agree if they are the same, speeds if neither exists; what is not known does
+        not agree.
+    status_smaller, status_larger : int
+        Codes of `towatlas.kernels.status`.
+    """
+
+    smaller: str
+    larger: str
+    question: str
+    quantity: str
+    unit: str
+    by_smaller: float
+    by_larger: float
+    relative: float
+    agrees: bool
+    status_smaller: int = status.OK
+    status_larger: int = status.OK
+
+    @property
+    def words(self) -> str:
+        """The difference as a percentage, or the two values where it has none."""
+        if isfinite(self.relative):
+            return percent(self.relative)
+        return ", ".join(self.values("{:.4g}"))
+
+    def values(self, form: str) -> tuple[str, str]:
+        """Both values in words.
+
+        Parameters
+        ----------
+        form : str
+            How numbers are formatted, as "{:.4g}".
+
+        Returns
+        -------
+        by_smaller, by_larger : str
+            "none" for what does not exist, "not known" for what could not be had.
+        """
+        by_smaller, by_larger = (
+            form.format(value) if code == status.OK else "none" if code in ABSENT else "not known"
+            for value, code in ((self.by_smaller, self.status_smaller), (self.by_larger, self.status_larger))
+        )
+        return by_smaller, by_larger
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The model used, and why.
+
+    Attributes
+    ----------
+    model : str
+        One of MODELS.
+    forced : bool
+        Whether it was named.
+    tolerance : float
+        Of the comparisons, relative [-], > 0.
+    asked : tuple of str
+        Of QUESTIONS.
+    answers : tuple of ModelAnswer
+        Of each model that was solved, in rising order; one at least.
+    differences : tuple of Difference
+        Between them.
+    untried : tuple of str
+        Models left out for want of keys.
+    """
+
+    model: str
+    forced: bool
+    tolerance: float
+    asked: tuple[str, ...]
+    answers: tuple[ModelAnswer, ...]
+    differences: tuple[Difference, ...]
+    untried: tuple[str, ...]
+
+    @property
+    def answer(self) -> ModelAnswer:
+        """The answer of the model used."""
+        return next(answer for answer in self.answers if answer.model == self.model)
+
+    @property
+    def reason(self) -> str:
+        """Why this model, with the numbers, in one sentence."""
+        if self.forced:
+            return f"{self.model} was asked for, and compared with no other"
+        if len(self.answers) == 1:
+            return "towed in a vacuum there is nothing to add"
+        place = [answer.model for answer in self.answers].index(self.model)
+        parts = [self._objection(answer.model) for answer in self.answers[:place]]
+        larger = [answer.model for answer in self.answers[place + 1 :]]
+        if larger:
+            parts.append(f"{self.model} agrees with {' and '.join(larger)} within {100 * self.tolerance:g} %")
+            if (most := self.largest(self.model)) is not None:
+                parts[-1] += f", at most {percent(most.relative)} in the {most.quantity}"
+        else:
+            parts.append(f"{self.model} is the largest model that the scene has the keys for")
+        parts += [f"{name} was not tried: it needs fish.volume or fish.submerged_weight" for name in self.untried]
+        return "; ".join(parts)
+
+    def largest(self, smaller: str) -> Difference | None:
+        """The largest relative difference of a model from larger ones.
+
+        Parameters
+        ----------
+        smaller : str
+            The model.
+
+        Returns
+        -------
+        Difference or None
+            None where none was compared.
+        """
+        finite = [d for d in self.differences if d.smaller == smaller and isfinite(d.relative)]
+        return max(finite, key=lambda d: d.relative, default=None)
+
+    def _objection(self, smaller: str) -> str:
+        """What a model differs in from the first larger one that it does not agree with."""
+        unlike = [d for d in self.differences if d.smaller == smaller and not d.agrees]
+        larger = unlike[0].larger
+        words = ", ".join(f"{d.quantity} ({d.words})" for d in unlike if d.larger == larger)
+        return f"{smaller} differs from {larger} in {words}"
+
+
+def percent(share: float) -> str:
+    """A share as a percentage: two digits, or all before the point.
+
+    Parameters
+    ----------
+    share : float
+        [-], >= 0.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> percent(0.01234), percent(2.5)
+    ('1.2 %', '250 %')
+    """
+    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
+
+
+def compare(smaller: ModelAnswer, larger: ModelAnswer, scene: Scene, orders: Sequence[int]) -> list[Difference]:
+    """All quantities of two models; critical speeds of the pairs given.
+
+    Parameters
+    ----------
+    smaller, larger : ModelAnswer
+    scene : Scene
+        Whose tolerance decides.
+    orders : sequence of int
+        Numbers of the pairs.
+
+    Returns
+    -------
+    list of Difference
+
+    Notes
+    -----
+    The position is compared as a share of the slant range, from the tow point to the fish by the larger model: as
+    errors of positions taken from the tow point are stated, and never small beside the cable. Tension and speeds are
+    shares of the larger model's.
+    """
+
+    def difference(question: str, quantity: str, unit: str, a: float, b: float, relative: float) -> Difference:
+        agrees = a == b if isnan(relative) else relative <= scene.tolerance
+        return Difference(smaller.model, larger.model, question, quantity, unit, a, b, relative, bool(agrees))
+
+    tow_point = np.array([scene.radius, 0.0, 0.0])
+    near, slant = (float(np.linalg.norm(answer.position - tow_point)) for answer in (smaller, larger))
+    moved = float(np.linalg.norm(smaller.position - larger.position)) / slant
+    pulled = abs(smaller.tension / larger.tension - 1.0)
+    return [
+        difference("nodes", "number of nodes", "", smaller.nodes, larger.nodes, nan),
+        difference("position", "position of the fish", "m", near, slant, moved),
+        difference("tension", "tow tension", "N", smaller.tension, larger.tension, pulled),
+        difference("speeds", "number of equilibria", "", smaller.number, larger.number, nan),
+        *(_speed_difference(smaller, larger, scene, n) for n in orders),
+    ]
+
+
+def _speed_difference(smaller: ModelAnswer, larger: ModelAnswer, scene: Scene, n: int) -> Difference:
+    """One critical speed by two models; two that do not exist agree, one that is not known agrees with nothing."""
+    (a, code_a), (b, code_b) = smaller.speeds.at(n), larger.speeds.at(n)
+    known = code_a == code_b == status.OK
+    relative = abs(a / b - 1.0) if known else nan
+    return Difference(
+        smaller=smaller.model,
+        larger=larger.model,
+        question="speeds",
+        quantity=f"critical speed {n}",
+        unit="m/s",
+        by_smaller=scene.speed_of(a),
+        by_larger=scene.speed_of(b),
+        relative=relative,
+        agrees=relative <= scene.tolerance if known else code_a in ABSENT and code_b in ABSENT,
+        status_smaller=code_a,
+        status_larger=code_b,
+    )
+
+
+def least_model(
+    scene: Scene,
+    model: str | None = None,
+    asked: Sequence[str] = QUESTIONS,
+    vacuum: PairSpeeds | None = None,
+    compared: Sequence[int] = (),
+) -> Choice:
+    """The least model whose answers to what is asked are those of all larger ones within the scene's tolerance.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a length.
+    model : str, optional
+        The model to use whatever the others say; they are not solved.
+    asked : sequence of str
+        Some of QUESTIONS.
+    vacuum : PairSpeeds, optional
+        The pairs whose critical speeds are asked for, by the vacuum model; none by default.
+    compared : sequence of int
+        Those of their numbers that are compared.
+
+    Returns
+    -------
+    Choice
+
+    Raises
+    ------
+    ValueError
+        For names out of range, and if one of the models has no such cable.
+    ArithmeticError
+        If a computation overflows or does not converge.
+    """
+    asked = check_questions(asked)
+    known, untried = ([check_model(model)], []) if model is not None else solvable_models(scene)
+    missing = scene.system(known[-1]).missing
+    if missing:
+        raise ValueError(f"the {known[-1]} model needs {', '.join(missing)}, for which keys of the scene are missing")
+    if "speeds" not in asked:
+        vacuum, compared = None, ()
+    answers = [_solved(scene, name, vacuum, len(known) > 1) for name in known]
+    return choose(scene, answers, asked, compared, model is not None, untried)
+
+
+def choose(
+    scene: Scene,
+    answers: Sequence[ModelAnswer],
+    asked: Sequence[str],
+    compared: Sequence[int] = (),
+    forced: bool = False,
+    untried: Sequence[str] = (),
+) -> Choice:
+    """The first of some answers that agrees with all after it in what is asked.
+
+    Parameters
+    ----------
+    scene : Scene
+    answers : sequence of ModelAnswer
+        Of models in rising order.
+    asked : sequence of str
+        Some of QUESTIONS.
+    compared : sequence of int
+        Numbers of the pairs whose critical speeds are compared.
+    forced : bool
+        Whether the model was named.
+    untried : sequence of str
+        Models left out for want of keys.
+
+    Returns
+    -------
+    Choice
+    """
+    differences = [
+        difference
+        for place, smaller in enumerate(answers)
+        for larger in answers[place + 1 :]
+        for difference in compare(smaller, larger, scene, compared)
+        if difference.question in asked
+    ]
+    unlike = {difference.smaller for difference in differences if not difference.agrees}
+    return Choice(
+        model=next(answer.model for answer in answers if answer.model not in unlike),
+        forced=forced,
+        tolerance=scene.tolerance,
+        asked=tuple(asked),
+        answers=tuple(answers),
+        differences=tuple(differences),
+        untried=tuple(untried),
+    )
+
+
+def _solved(scene: Scene, model: str, vacuum: PairSpeeds | None, compared: bool) -> ModelAnswer:
+    try:
+        return solve_model(scene, model, vacuum)
+    except (ValueError, ArithmeticError) as error:
+        hint = "; a smaller one named by --model answers without it" if compared and model != "vacuum" else ""
+        raise type(error)(f"the {model} model has no answer: {error}{hint}") from None

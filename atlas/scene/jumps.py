@@ -1,0 +1,219 @@
+"""The jumps of a scene: its critical speeds, and the shapes between them, by the least model that answers."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from towatlas.kernels import status
+from towatlas.limits import transitions
+from towatlas.results import Equilibria
+from towatlas.scene.choice import Choice, least_model
+from towatlas.scene.models import QUESTIONS
+from towatlas.scene.pairs import PairSpeeds
+from towatlas.scene.scene import Scene
+from towatlas.solve.critical import solve_critical
+from towatlas.tables.atlas import Atlas
+
+# A jump is near where its speed is within this share of the scene's.
+NEAR = 0.1
+# Transitions listed at least, and asked for at a time.
+BLOCK = 6
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """Critical speeds of one cable in a vacuum, in rising order.
+
+    Attributes
+    ----------
+    n : ndarray of int, shape (transitions,)
+        Number of the transition [-], >= 1.
+    gamma : ndarray, shape (transitions,)
+        Speed Omega sqrt(R/g) [-], > 0; nan where status says why.
+    error : ndarray, shape (transitions,)
+        Estimated relative error of gamma [-], > 0.
+    looked_up : ndarray of bool, shape (transitions,)
+        In an atlas; else solved.
+    status : ndarray of int8, shape (transitions,)
+        Codes of `towatlas.kernels.status`.
+    existing : int
+        How many transitions the cable has in all, >= 0.
+    """
+
+    n: NDArray[np.int64]
+    gamma: Array
+    error: Array
+    looked_up: NDArray[np.bool_]
+    status: NDArray[np.int8]
+    existing: int
+
+    def near(self, gamma: float) -> NDArray[np.bool_]:
+        """Which are within 10 % of a speed.
+
+        Parameters
+        ----------
+        gamma : float
+            [-], > 0.
+
+        Returns
+        -------
+        ndarray of bool, shape (transitions,)
+        """
+        return np.abs(self.gamma / gamma - 1.0) <= NEAR
+
+    def nearest(self, gamma: float) -> int:
+        """Row of the one nearest to a speed.
+
+        Parameters
+        ----------
+        gamma : float
+            [-], > 0.
+
+        Returns
+        -------
+        int
+            -1 where there is none.
+        """
+        known = np.isfinite(self.gamma)
+        return int(np.argmin(np.where(known, np.abs(self.gamma - gamma), np.inf))) if known.any() else -1
+
+    def passed(self, gamma: float) -> int:
+        """How many lie below a speed.
+
+        Parameters
+        ----------
+        gamma : float
+            [-], > 0.
+
+        Returns
+        -------
+        int
+        """
+        return int(np.sum(self.gamma < gamma))
+
+
+@dataclass(frozen=True)
+class SceneAnswer:
+    """A scene's critical speeds in a vacuum, the model chosen for it and what that one answers.
+
+    Attributes
+    ----------
+    scene : Scene
+        What was asked about.
+    jumps : Jumps
+        By the vacuum model, dimensionless.
+    choice : Choice
+        The model used and why, with its answers in SI.
+    """
+
+    scene: Scene
+    jumps: Jumps
+    choice: Choice
+
+    @property
+    def equilibria(self) -> Equilibria:
+        """Those of the model used, dimensionless."""
+        return self.choice.answer.equilibria
+
+
+def critical_speeds(*, lam: float, w_f: float, gamma: float, atlas: Atlas | None = None) -> Jumps:
+    """Critical speeds of a cable, the lowest six and on, until they leave a speed behind by 10 %.
+
+    Parameters
+    ----------
+    lam, w_f, gamma : float
+        Cable length, fish weight and speed [-].
+    atlas : Atlas, optional
+        Where they are looked up if it holds them; what it does not hold is solved directly.
+
+    Returns
+    -------
+    Jumps
+    """
+    existing = transitions(lam=lam, w_f=w_f)
+    parts: list[dict[str, NDArray]] = []
+    first = 1
+    while first <= existing:
+        n = np.arange(first, min(first + BLOCK, existing + 1))
+        parts.append(_block(n, lam=lam, w_f=w_f, atlas=atlas))
+        highest = parts[-1]["gamma"][-1]
+        # One that fails lies at its threshold, where critical speeds are boundless.
+        if not highest <= gamma * (1.0 + NEAR):
+            break
+        first += BLOCK
+    columns = {
+        name: np.concatenate([part[name] for part in parts]) if parts else np.empty(0, kind)
+        for name, kind in (("n", int), ("gamma", float), ("error", float), ("looked_up", bool), ("status", np.int8))
+    }
+    return Jumps(**columns, existing=existing)
+
+
+def _block(n: NDArray[np.int64], *, lam: float, w_f: float, atlas: Atlas | None) -> dict[str, NDArray]:
+    names = ("gamma", "error", "status")
+    if atlas is None:
+        there = np.zeros(len(n), bool)
+        columns = {name: np.empty(len(n), np.int8 if name == "status" else float) for name in names}
+    else:
+        states = atlas.states(lam, w_f, n, outside="nan")
+        there = states.status != status.OUTSIDE
+        columns = {name: getattr(states, name).copy() for name in names}
+    if not there.all():
+        solved = solve_critical(lam, w_f, n[~there])
+        for name in names:
+            columns[name][~there] = getattr(solved, name)
+    return {"n": n, "looked_up": there, **columns}
+
+
+def answer_scene(
+    scene: Scene, atlas: Atlas | None = None, model: str | None = None, asked: Sequence[str] = QUESTIONS
+) -> SceneAnswer:
+    """Critical speeds and equilibria of a scene, by the least model that answers what is asked.
+
+    Parameters
+    ----------
+    scene : Scene
+        From `towatlas.read_scene`, with a length.
+    atlas : Atlas, optional
+        Where critical speeds are looked up if it holds them.
+    model : str, optional
+        The model to use whatever the others say, one of "vacuum", "air", "water"; by default the least.
+    asked : sequence of str
+        What it has to answer, some of "nodes", "position", "tension", "speeds".
+
+    Returns
+    -------
+    SceneAnswer
+
+    Raises
+    ------
+    ValueError
+        If the scene has no length, or one of the models no such cable.
+    ArithmeticError
+        If the computation overflows or does not converge.
+
+    Examples
+    --------
+    >>> from towatlas.scene.file import read_scene
+    >>> answer = answer_scene(read_scene("skop-fig3"), model="vacuum")
+    >>> int(answer.equilibria.nodes[answer.equilibria.expected])
+    1
+    """
+    groups, gamma = scene.system("vacuum"), scene.gamma
+    if not np.isfinite(groups.lam):
+        raise ValueError(f"{scene.source}: cable.length is missing; a design finds one: towatlas design --help")
+    jumps = critical_speeds(lam=groups.lam, w_f=groups.w_f, gamma=gamma, atlas=atlas)
+    passed = jumps.passed(gamma)
+    # The pairs that decide where the cable jumps, as it slows down and speeds up; one more should the second be gone.
+    there = (jumps.n >= passed) & (jumps.n <= passed + 2)
+    choice = least_model(
+        scene,
+        model,
+        asked,
+        vacuum=PairSpeeds.of_vacuum(jumps.n[there], jumps.gamma[there], jumps.status[there]),
+        compared=[n for n in (passed, passed + 1) if n in jumps.n],
+    )
+    return SceneAnswer(scene=scene, jumps=jumps, choice=choice)

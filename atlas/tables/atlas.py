@@ -1,0 +1,439 @@
+"""Answers from a file, whichever it holds. Needs numpy and netCDF4 only."""
+
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike, NDArray
+
+from towatlas.checks import (
+    check_broadcast,
+    check_choice,
+    check_order,
+    check_outside,
+    check_real,
+)
+from towatlas.nomenclature import SYMBOLS, Symbol
+from towatlas.results import CriticalStates, DragFolds, FishPositions
+from towatlas.tables.critical import QUANTITIES, CriticalTable
+from towatlas.tables.drag_folds import DragFoldTable
+from towatlas.tables.file import default_path, open_group, read_root
+from towatlas.tables.fish import BRANCHES, FishTable
+from towatlas.tables.seal import AtlasFileError
+
+NEAR_CHOICES = ("solve", "nan")
+PARTS = (CriticalTable, FishTable, DragFoldTable)
+
+
+def open_atlas(path: str | os.PathLike | None = None) -> "Atlas":
+    """Open a file made by `towatlas build` and check that it is whole.
+
+    Parameters
+    ----------
+    path : path, optional
+        The file; without it $TOWATLAS_FILE, else build/atlas.nc.
+
+    Returns
+    -------
+    Atlas
+        With critical speeds, positions of the fish, folds with drag: whichever the file holds.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    AtlasFileError
+        If the file is damaged (a single changed bit is noticed), holds none of these, or is of a newer version.
+
+    Examples
+    --------
+    >>> atlas = open_atlas("build/atlas.nc")
+    >>> atlas.holds
+    ('critical speeds',)
+    >>> round(float(atlas.critical_speed(37.8, 1352, n=2)), 8)
+    3.41756706
+    """
+    return Atlas(default_path() if path is None else Path(path))
+
+
+class Atlas:
+    """What a file holds, interpolated. Made by `open_atlas`; safe to share between threads.
+
+    `fish` says where the fish is at any speed, `folds` where pairs of equilibria appear and end with drag, `states` all
+    quantities of the critical states. Each of `critical_speed`, `reaction`, `fish_offset`, `fish_depth`, `tow_tension`,
+    `error` and `status` returns one of them, and takes xarray DataArrays, too.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    attributes : dict
+        Its global attributes.
+    sha256 : str
+        Its seal, 64 hexadecimal digits.
+
+    Notes
+    -----
+    outside : what becomes of points the table does not hold (too close to the threshold, too long a cable, too heavy
+    a fish, n beyond the table, nan): "raise" a ValueError that names the axis, the value and the limits; "nan", with
+    the reason in the status; or "solve" them directly. Nothing is ever extrapolated. A cable no longer than lambda_cn
+    has no n-th transition: the answer is nan, its status NO_TRANSITION.
+    """
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.attributes, data, self.sha256 = read_root(path)
+        method = self.attributes.get("method", "")
+        with open_group(path, data) as file:
+            self._parts = {part: part(file) for part in PARTS if part.in_file(file, method)}
+        if not self._parts:
+            raise AtlasFileError(
+                f"{path} was built with --method {method} and holds a plain table only; lookup needs an atlas built "
+                "with --method fold"
+            )
+
+    def __repr__(self) -> str:
+        return f"Atlas({str(self.path)!r}: {', '.join(self.holds)})"
+
+    @property
+    def holds(self) -> tuple[str, ...]:
+        """In words: "critical speeds", "fish positions", "folds with drag"."""
+        return tuple(part.holds for part in self.parts)
+
+    @property
+    def parts(self) -> list[CriticalTable | FishTable | DragFoldTable]:
+        """What the file holds."""
+        return list(self._parts.values())
+
+    @property
+    def critical(self) -> CriticalTable:
+        """The part with critical states; AtlasFileError if the file does not hold it."""
+        return self.part(CriticalTable)
+
+    @property
+    def positions(self) -> FishTable:
+        """The part with positions of the fish; AtlasFileError if the file does not hold it."""
+        return self.part(FishTable)
+
+    @property
+    def drag(self) -> DragFoldTable:
+        """The part with folds with drag; AtlasFileError if the file does not hold it."""
+        return self.part(DragFoldTable)
+
+    def part(self, part: Any) -> Any:
+        """The part of a class of PARTS.
+
+        Parameters
+        ----------
+        part : type
+            `CriticalTable`, `FishTable` or `DragFoldTable`.
+
+        Returns
+        -------
+        CriticalTable, FishTable or DragFoldTable
+
+        Raises
+        ------
+        AtlasFileError
+            If the file does not hold it.
+        """
+        if part not in self._parts:
+            raise AtlasFileError(
+                f"{self.path} holds no {part.holds}, only {' and '.join(self.holds)}; `{part.made_by}` makes a file "
+                "that does"
+            )
+        return self._parts[part]
+
+    def states(self, lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1, outside: str = "raise") -> CriticalStates:
+        """All quantities of the critical states, with error estimate and status.
+
+        Parameters
+        ----------
+        lam : array_like
+            Cable length over tow radius [-].
+        w_f : array_like
+            Fish weight over (mu + rho A) g R [-].
+        n : array_like of int
+            Number of the transition, >= 1.
+        outside : {"raise", "nan", "solve"}
+            What becomes of points that the table does not hold; see the class.
+
+        Returns
+        -------
+        CriticalStates
+            Arrays of the broadcast shape; nan where status is not OK.
+
+        Raises
+        ------
+        ValueError
+            For what is not a number, and points outside with outside="raise".
+        AtlasFileError
+            If the file holds no critical speeds.
+
+        Examples
+        --------
+        >>> states = open_atlas("build/atlas.nc").states([1.5, 10.0], 0.0)
+        >>> [states.sentence(k) for k in range(2)]
+        ['no such transition: the cable is not longer than lambda_cn', 'computed']
+        """
+        check_outside(outside)
+        lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
+        table = self.critical.answer(QUANTITIES, outside, lam=lam.ravel(), w_f=w_f.ravel(), n=n.ravel())
+        return CriticalStates(n=n, lam=lam, w_f=w_f, **_shaped(table, n))
+
+    def critical_speed(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Critical speed gamma_cn = Omega sqrt(R/g).
+
+        Parameters
+        ----------
+        lam, w_f : array_like or DataArray
+            Cable length over tow radius, fish weight over (mu + rho A) g R [-].
+        n : array_like of int or DataArray
+            Number of the transition, >= 1.
+        outside : {"raise", "nan", "solve"}
+            What becomes of points that the table does not hold; see the class.
+
+        Returns
+        -------
+        float, ndarray or DataArray
+            [-], > 0; relative error estimate: `error`.
+        """
+        return self._quantity("gamma", lam, w_f, n, outside)
+
+    def reaction(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Radial reaction at the tow point R_x0^cn.
+
+        Parameters
+        ----------
+        lam, w_f : array_like or DataArray
+            Cable length over tow radius, fish weight over (mu + rho A) g R [-].
+        n : array_like of int or DataArray
+            Number of the transition, >= 1.
+        outside : {"raise", "nan", "solve"}
+            What becomes of points that the table does not hold; see the class.
+
+        Returns
+        -------
+        float, ndarray or DataArray
+            Over (mu + rho A) g R [-]; negative.
+        """
+        return self._quantity("R_x0", lam, w_f, n, outside)
+
+    def fish_offset(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Radial position of the fish x_f.
+
+        Parameters
+        ----------
+        lam, w_f : array_like or DataArray
+            Cable length over tow radius, fish weight over (mu + rho A) g R [-].
+        n : array_like of int or DataArray
+            Number of the transition, >= 1.
+        outside : {"raise", "nan", "solve"}
+            What becomes of points that the table does not hold; see the class.
+
+        Returns
+        -------
+        float, ndarray or DataArray
+            Over tow radius [-], with the sign of (-1)^n.
+        """
+        return self._quantity("x_f", lam, w_f, n, outside)
+
+    def fish_depth(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Depth of the fish z_f.
+
+        Parameters
+        ----------
+        lam, w_f : array_like or DataArray
+            Cable length over tow radius, fish weight over (mu + rho A) g R [-].
+        n : array_like of int or DataArray
+            Number of the transition, >= 1.
+        outside : {"raise", "nan", "solve"}
+            What becomes of points that the table does not hold; see the class.
+
+        Returns
+        -------
+        float, ndarray or DataArray
+            Below the tow point over tow radius [-], > 0.
+        """
+        return self._quantity("z_f", lam, w_f, n, outside)
+
+    def tow_tension(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Cable tension at the tow point.
+
+        Parameters
+        ----------
+        lam, w_f : array_like or DataArray
+            Cable length over tow radius, fish weight over (mu + rho A) g R [-].
+        n : array_like of int or DataArray
+            Number of the transition, >= 1.
+        outside : {"raise", "nan", "solve"}
+            What becomes of points that the table does not hold; see the class.
+
+        Returns
+        -------
+        float, ndarray or DataArray
+            Over (mu + rho A) g R [-], > 0.
+        """
+        return self._quantity("tension", lam, w_f, n, outside)
+
+    def error(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Estimated relative error of the critical speed.
+
+        Parameters
+        ----------
+        lam, w_f : array_like or DataArray
+            Cable length over tow radius, fish weight over (mu + rho A) g R [-].
+        n : array_like of int or DataArray
+            Number of the transition, >= 1.
+        outside : {"raise", "nan", "solve"}
+            What becomes of points that the table does not hold; see the class.
+
+        Returns
+        -------
+        float, ndarray or DataArray
+            [-], > 0.
+        """
+        return self._quantity("error", lam, w_f, n, outside)
+
+    def status(self, lam: Any, w_f: Any, n: Any = 1, outside: str = "raise") -> Any:
+        """Status codes.
+
+        Parameters
+        ----------
+        lam, w_f : array_like or DataArray
+            Cable length over tow radius, fish weight over (mu + rho A) g R [-].
+        n : array_like of int or DataArray
+            Number of the transition, >= 1.
+        outside : {"raise", "nan", "solve"}
+            What becomes of points that the table does not hold; see the class.
+
+        Returns
+        -------
+        int8, ndarray or DataArray
+            Of `towatlas.kernels.status`.
+        """
+        return self._quantity("status", lam, w_f, n, outside)
+
+    def fish(
+        self,
+        lam: ArrayLike,
+        w_f: ArrayLike,
+        gamma: ArrayLike,
+        branch: str = "median",
+        *,
+        outside: str = "raise",
+        near: str = "solve",
+    ) -> FishPositions:
+        """Position of the fish.
+
+        Parameters
+        ----------
+        lam : array_like
+            Cable length over tow radius [-].
+        w_f : array_like
+            Fish weight over (mu + rho A) g R [-].
+        gamma : array_like
+            Speed Omega sqrt(R/g) [-].
+        branch : {"median", "outward"}
+            The shape that Skop expects to be seen, with a node more beyond every critical speed; or the one without
+            nodes that swings outward. Up to the first critical speed they are one.
+        outside : {"raise", "nan", "solve"}
+            What becomes of points that the grid does not hold: a ValueError that says which axis, nan with the reason
+            in the status, or the direct solution.
+        near : {"solve", "nan"}
+            What becomes of points next to a fold: the direct solution, which needs numba, or nan.
+
+        Returns
+        -------
+        FishPositions
+            Arrays of the broadcast shape; nan where status is not OK.
+
+        Raises
+        ------
+        ValueError
+            For what is not a number, a choice that does not exist, and points outside with outside="raise".
+        AtlasFileError
+            If the file holds no positions of the fish.
+
+        Examples
+        --------
+        >>> at = open_atlas("build/equilibria.nc").fish([5.0, 8.0], 1.0, 0.9)
+        >>> at.nodes.tolist(), [round(float(x), 2) for x in at.x_f]
+        ([1, 1], [-1.3, -1.56])
+        """
+        check_choice("branch", branch, BRANCHES)
+        check_outside(outside)
+        check_choice("near", near, NEAR_CHOICES)
+        lam, w_f, gamma = check_broadcast(
+            lam=check_real("lam", lam), w_f=check_real("w_f", w_f), gamma=check_real("gamma", gamma)
+        )
+        table = self.positions.answer(branch, outside, near, lam=lam.ravel(), w_f=w_f.ravel(), gamma=gamma.ravel())
+        return FishPositions(lam=lam, w_f=w_f, gamma=gamma, **_shaped(table, lam))
+
+    def folds(
+        self, lam: ArrayLike, w_f: ArrayLike, C: ArrayLike, n: ArrayLike = 1, outside: str = "raise"
+    ) -> DragFolds:
+        """Where the n-th pair of equilibria appears and ends with drag, and C*_n.
+
+        Parameters
+        ----------
+        lam, w_f, C : array_like
+            Cable length, fish weight and drag constant of the cable [-].
+        n : array_like of int
+            Number of the transition.
+        outside : {"raise", "nan", "solve"}
+            What becomes of points outside the table: a ValueError that says how, nan, or the direct solver.
+
+        Returns
+        -------
+        DragFolds
+            Arrays of the broadcast shape; nan where a status says why.
+
+        Raises
+        ------
+        ValueError
+            For what is not a number, a choice that does not exist, and points outside with outside="raise".
+        AtlasFileError
+            If the file holds no folds with drag.
+
+        Notes
+        -----
+        Nothing is extrapolated, and nothing is interpolated across the cusp: C within the error of C*_n, and `ends` at
+        drags below those of the series, are outside.
+        """
+        check_outside(outside)
+        arrays = {"lam": check_real("lam", lam), "w_f": check_real("w_f", w_f), "C": check_real("C", C)}
+        lam, w_f, C, n = check_broadcast(**arrays, n=check_order(n))
+        table = self.drag.answer(outside, lam=lam.ravel(), w_f=w_f.ravel(), C=C.ravel(), n=n.ravel())
+        return DragFolds(n=n, lam=lam, w_f=w_f, C=C, **_shaped(table, n))
+
+    def _quantity(self, name: str, lam: Any, w_f: Any, n: Any, outside: str) -> Any:
+        def plain(*cable: Any) -> Any:
+            check_outside(outside)
+            lam, w_f, n = cable
+            lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
+            table = self.critical.answer((name,), outside, lam=lam.ravel(), w_f=w_f.ravel(), n=n.ravel())
+            return table[name].reshape(n.shape)[()]
+
+        return _with_xarray(plain, SYMBOLS[name], lam, w_f, n)
+
+
+def _shaped(table: dict[str, NDArray[Any]], like: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    return {name: column.reshape(like.shape) for name, column in table.items()}
+
+
+def _with_xarray(plain: Callable, symbol: Symbol, *arguments: Any) -> Any:
+    """Apply a function of arrays to arguments some of which may be xarray objects; then the result is one too."""
+    # Whoever passes an xarray object has imported xarray: no need to import it to find out.
+    xarray = sys.modules.get("xarray")
+    labelled = [value for value in arguments if hasattr(value, "dims")]
+    if xarray is None or not labelled:
+        return plain(*arguments)
+    if not all(isinstance(value, xarray.DataArray) for value in labelled):
+        raise ValueError("labelled arguments must be xarray DataArrays; take one variable out of a Dataset")
+    result = xarray.apply_ufunc(plain, *arguments)
+    result.name = symbol.name
+    result.attrs = {"long_name": symbol.long_name, "units": "1"}
+    return result

@@ -1,0 +1,94 @@
+"""Reading a file of towatlas: its bytes, checked against their seal, as NetCDF. Needs numpy and netCDF4 only."""
+
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+
+from towatlas.tables.seal import AtlasFileError, read_sealed
+
+SCHEMA_VERSION = 1
+# Where the files are put by default, and looked for.
+EQUILIBRIA_PATH = Path("build/equilibria.nc")
+
+_NETCDF = threading.Lock()
+
+
+def default_path() -> Path:
+    """The atlas used when none is named.
+
+    Returns
+    -------
+    Path
+        $TOWATLAS_FILE, else build/atlas.nc.
+    """
+    return Path(os.environ.get("TOWATLAS_FILE", "build/atlas.nc"))
+
+
+def _dataset(path: Path, data: bytes) -> netCDF4.Dataset:
+    try:
+        file = netCDF4.Dataset(path.name, memory=data)
+    except (OSError, RuntimeError) as error:
+        raise AtlasFileError(f"{path} is not a readable NetCDF-4 file: {error}") from None
+    file.set_auto_mask(False)
+    return file
+
+
+@contextmanager
+def open_group(path: Path, data: bytes) -> Iterator[netCDF4.Dataset]:
+    """The file whose bytes these are, for reading at once: the NetCDF library is not safe to call from two threads.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    data : bytes
+
+    Yields
+    ------
+    netCDF4.Dataset
+
+    Raises
+    ------
+    AtlasFileError
+        If it is no NetCDF-4 file.
+    """
+    with _NETCDF, _dataset(path, data) as file:
+        yield file
+
+
+def read_root(path: Path) -> tuple[dict[str, Any], bytes, str]:
+    """Global attributes, bytes and seal of any towatlas file, an atlas or a plain table.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    attributes : dict
+    data : bytes
+    seal : str
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    AtlasFileError
+        If it is damaged, none of towatlas, or of a newer version.
+    """
+    data, seal = read_sealed(path)
+    with open_group(path, data) as file:
+        attributes = {name: file.getncattr(name) for name in file.ncattrs()}
+    version = attributes.get("schema_version")
+    if version is None:
+        raise AtlasFileError(f"{path} is not an atlas: it has no schema_version")
+    if version > SCHEMA_VERSION:
+        raise AtlasFileError(
+            f"{path} has schema version {version}, this towatlas reads up to {SCHEMA_VERSION}; upgrade towatlas"
+        )
+    return attributes, data, seal
