@@ -55,14 +55,16 @@ def _usable_cache() -> Path | None:
     """The cache folder for these sources, or None where nothing can be written."""
     try:
         root = _cache_root()
-        folder = root / source_hash()[:16]
+        folder = root / f"{source_hash()[:16]}-numba-{numba.__version__}"
         folder.mkdir(parents=True, exist_ok=True)
         if not os.access(folder, os.W_OK):
             return None
         os.utime(folder)
         for other in root.iterdir():
-            if other != folder and time.time() - other.stat().st_mtime > STALE_AFTER:
-                shutil.rmtree(other, ignore_errors=True)
+            # One that another process deletes in the meantime, or a dangling link, is not ours to mind.
+            with suppress(OSError):
+                if other != folder and time.time() - other.stat().st_mtime > STALE_AFTER:
+                    shutil.rmtree(other, ignore_errors=True)
     except (OSError, RuntimeError):
         return None
     return folder
@@ -75,14 +77,11 @@ class _SealedFile(IndexDataCacheFile):
     """numba's index and data files of one kernel, each behind a digest."""
 
     def _load_index(self) -> dict:
-        content = self._read(self._index_path)
-        if content is None:
-            return {}
-        version, stamp, overloads = content
-        return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
+        stamp, overloads = self._read(self._index_path) or (None, {})
+        return overloads if stamp == self._source_stamp else {}
 
     def _save_index(self, overloads: dict) -> None:
-        self._write(self._index_path, (self._version, self._source_stamp, overloads))
+        self._write(self._index_path, (self._source_stamp, overloads))
 
     def _load_data(self, name: str) -> Any:
         return self._read(self._data_path(name))
@@ -92,6 +91,8 @@ class _SealedFile(IndexDataCacheFile):
 
     def _read(self, path: str) -> Any:
         """What a file holds; None where there is none, or none that is whole."""
+        if Path(path).is_dir():
+            _throw_away(path)
         try:
             content = Path(path).read_bytes()
         except OSError:
@@ -120,6 +121,19 @@ class _SealedCache(FunctionCache):
             source_stamp=plain._source_stamp,
         )
 
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # whatever a file raises that is whole, but not what numba would write
+            # The index leads to all others.
+            _throw_away(self._cache_file._index_path)
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        # Where nothing can be written, as on a full disk, the kernel is compiled again the next time.
+        with suppress(OSError):
+            super().save_overload(sig, data)
+
 
 _said_damaged = False
 
@@ -128,7 +142,7 @@ def _throw_away(path: str) -> None:
     """Delete a damaged file; the first of a process is told of."""
     global _said_damaged
     with suppress(OSError):
-        os.unlink(path)
+        shutil.rmtree(path) if os.path.isdir(path) else os.unlink(path)
     if not _said_damaged:
         _said_damaged = True
         print(f"towatlas: {path} is damaged: compiling what was in it again", file=sys.stderr)
@@ -143,9 +157,9 @@ class _Listener(event.Listener):
     def on_start(self, event: event.Event) -> None:
         function = event.data["dispatcher"].py_func
         # numba compiles under a lock of its own: one thread at a time counts here.
-        self.depth += 1
-        if self.depth == 1 and (function.__module__ or "").startswith(__name__.rpartition(".")[0]):
+        if self.depth == 0 and (function.__module__ or "").startswith(__name__.rpartition(".")[0]):
             notice.compiling(function.__name__)
+        self.depth += 1
 
     def on_end(self, event: event.Event) -> None:
         self.depth -= 1
@@ -191,8 +205,17 @@ def kernel(function: Callable) -> Callable:
 
 
 # One parallel kernel at a time: each takes all threads anyway, and of numba's threading layers workqueue, the one that
-# is always there, ends the process when two threads call at once.
-_ONE_AT_A_TIME = threading.Lock()
+# is always there, ends the process when two threads call at once. Reentrant, for a signal may call one on the way out
+# of another; and a child of a fork begins with one that nobody holds.
+_one_at_a_time = threading.RLock()
+
+
+def _renew_lock() -> None:
+    global _one_at_a_time
+    _one_at_a_time = threading.RLock()
+
+
+os.register_at_fork(after_in_child=_renew_lock)
 
 
 def parallel_kernel(function: Any) -> Callable:
@@ -209,7 +232,7 @@ def parallel_kernel(function: Any) -> Callable:
 
     @wraps(twin)
     def run(*arguments: Any) -> None:
-        with _ONE_AT_A_TIME:
+        with _one_at_a_time:
             dispatcher(*arguments)
 
     return run

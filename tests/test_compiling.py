@@ -1,6 +1,8 @@
 """The cache of compiled kernels: used, and never stale."""
 
+import hashlib
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -129,6 +131,60 @@ def test_damaged_cache_is_made_again(tmp_path, ending, damage):
     assert "is damaged" in err
     assert err.count("\n") == 1
     assert run(SHOT, tmp_path) == (f"{value} 1\n", "")
+
+
+def sealed(payload):
+    return hashlib.sha256(payload).digest() + payload
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("payload", [b"garbage!", pickle.dumps(5)], ids=["garbage", "a number"])
+def test_whole_files_of_something_else_are_thrown_away(tmp_path, ending, payload):
+    value, _ = run(SHOT, tmp_path)[0].split()
+    (file,) = tmp_path.rglob(f"scan.forward_shots-*.{ending}")
+    file.write_bytes(sealed(payload))
+    out, err = run(SHOT, tmp_path)
+    assert out.split() == [value, "0"]
+    assert "is damaged" in err
+    assert run(SHOT, tmp_path) == (f"{value} 1\n", "")
+
+
+def test_an_answer_is_not_lost_for_want_of_a_place_to_keep_its_kernel(tmp_path):
+    limited = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))\n" + SHOT
+    out, err = run(limited, tmp_path)
+    assert out.split()[1] == "0"
+    assert err == ""
+
+
+def test_a_folder_in_the_place_of_a_file_and_a_dangling_link(tmp_path):
+    value, _ = run(SHOT, tmp_path)[0].split()
+    (tmp_path / "towatlas" / "link").symlink_to(tmp_path / "nowhere")
+    (file,) = tmp_path.rglob("scan.forward_shots-*.nbi")
+    file.unlink()
+    file.mkdir()
+    assert run(SHOT, tmp_path)[0].split() == [value, "0"]
+    assert run(SHOT, tmp_path) == (f"{value} 1\n", "")
+
+
+def test_a_signal_and_a_fork_within_a_parallel_kernel():
+    """A handler that calls one itself, on the way out of another, and a child of a process that was in one, go on."""
+    code = """
+import os, signal, threading
+import numpy as np, towatlas
+from towatlas.kernels import compiling
+speeds = lambda: towatlas.solve_critical(np.geomspace(5.0, 50.0, 600), 1.0).gamma
+alone, answers = speeds(), []
+signal.signal(signal.SIGUSR1, lambda *_: answers.append(speeds()))
+with compiling._one_at_a_time:
+    os.kill(os.getpid(), signal.SIGUSR1)
+    held = compiling._one_at_a_time
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if compiling._one_at_a_time is not held else 1)
+print(os.waitpid(child, 0)[1], np.array_equal(answers[0], alone))
+"""
+    cache = os.environ.get("NUMBA_CACHE_DIR", Path.home() / ".cache")
+    assert run(code, cache)[0].split() == ["0", "True"]
 
 
 def test_threads_share_the_layer_that_allows_no_two_at_once():
