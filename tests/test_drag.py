@@ -312,8 +312,12 @@ def test_bad_points_of_a_shape():
     found = towatlas.equilibria(5, 1, 1, C=0.1)
     with pytest.raises(ValueError, match="arc lengths from 0 to lam = 5"):
         shape_of(found, 0, [5.1])
-    with pytest.raises(ValueError, match=r"a row of the equilibria, from 0 to \d+; got 17"):
+    with pytest.raises(ValueError, match=r"a whole number from 0 to \d+, .*; got 17"):
         shape_of(found, 17, [1.0])
+    for bad in (True, 1.0, "sideways", -1):
+        with pytest.raises(ValueError, match="root must be expected"):
+            shape_of(found, bad)
+    assert shape_of(found, "outward").attrs["branch"] == "outward"
     with pytest.raises(ValueError, match="give it a fish"):
         towatlas.equilibria(5, 0, 1, C=0.1, w=0)
 

@@ -182,6 +182,22 @@ def test_a_bracket_without_a_root():
     assert found[1] == 1.0
 
 
+def test_a_bracket_of_nothing_but_negative_values():
+    """Without slopes the upper end is looked at before an answer is given; a root at it is one."""
+    none = np.full(1, np.nan)
+    found, solved = bracket(lambda x, i: (-1.0 + 0.0 * x, none), np.zeros(1), np.ones(1))
+    assert solved[0]
+    assert np.isnan(found[0])
+    found, solved = bracket(lambda x, i: (x - 1.0, none), np.zeros(1), np.ones(1))
+    assert (found[0], solved[0]) == (1.0, True)
+
+
+def test_a_function_that_becomes_nan_is_not_solved():
+    found, solved = bracket(lambda x, i: (np.where(x > 0.3, np.nan, -1.0), 1.0 + 0.0 * x), np.zeros(1), np.ones(1))
+    assert not solved[0]
+    assert np.isnan(found[0])
+
+
 # Curves.
 
 

@@ -169,7 +169,8 @@ def tangents(jacobian: Array) -> Array:
         minors = larger
     every = tuple(range(unknowns))
     direction = np.stack([(1.0 if k % 2 == 0 else -1.0) * minors[every[:k] + every[k + 1 :]] for k in every], axis=1)
-    return direction / np.linalg.norm(direction, axis=1)[:, None]
+    with np.errstate(invalid="ignore"):
+        return direction / np.linalg.norm(direction, axis=1)[:, None]
 
 
 def follow(equations: Equations, start: Array, tangent: Array, stop: Stop, steps: Steps) -> list[Curve]:

@@ -21,7 +21,7 @@ Function = Callable[[Array, Integers], tuple[Array, Array]]
 
 EPS = 2.0**-52
 # Every so many rounds a bracket is halved, whatever Newton or false position say, and there are rounds enough to halve
-# it down to rounding: none takes for ever, however flat the function.
+# it down to the rounding of a root of its own size: none takes for ever, however flat the function.
 HALVED_EVERY, HALVED_EVERY_WITHOUT_SLOPE = 8, 3
 BRACKET_ROUNDS = 500
 
@@ -69,7 +69,7 @@ def newton(
         The last of each row.
     solved : ndarray of bool, shape (rows,)
     """
-    z, steps, solved = z.copy(), np.full(z.shape, np.nan), np.zeros(len(z), bool)
+    z, steps, solved = np.array(z, float), np.full(z.shape, np.nan), np.zeros(len(z), bool)
     last = np.full(len(z), np.inf)
     active = np.asarray(np.isfinite(z).all(axis=1))
     for _ in range(rounds):
@@ -105,11 +105,11 @@ def bracket(
     ----------
     function : callable
     low, high : ndarray, shape (rows,)
-        Ends; a function is taken to be negative at `low`. That it is positive at `high` need not be known.
+        Ends, finite; a function is taken to be negative at `low`. That it is positive at `high` need not be known.
     start : ndarray, shape (rows,), optional
         First points tried; the middles by default.
     resolution : float or ndarray, shape (rows,)
-        What a root need not be known better than, beside its own rounding.
+        What a root need not be known better than, beside its own rounding; a root at zero needs one.
     last_step : float or ndarray, shape (rows,)
         A step of Newton this short is the last: the square of it is below the resolution.
 
@@ -118,7 +118,7 @@ def bracket(
     x : ndarray, shape (rows,)
         nan where the function is negative at `high`.
     solved : ndarray of bool, shape (rows,)
-        Whether a row came to an end: False for one that did not in BRACKET_ROUNDS.
+        Whether a row came to an end: False, and nan, for one whose function became nan or that needs more rounds.
     """
     rows = len(low)
     low, high = low.copy(), high.copy()
@@ -126,12 +126,13 @@ def bracket(
     x = 0.5 * (low + high) if start is None else np.clip(start, low, high)
     resolution, last_step = np.broadcast_to(resolution, rows), np.broadcast_to(last_step, rows)
     side, same = np.full(rows, -1), np.zeros(rows, np.int64)
-    solved = np.zeros(rows, bool)
+    solved, lost = np.zeros(rows, bool), np.zeros(rows, bool)
     for round_ in range(BRACKET_ROUNDS):
-        i = np.flatnonzero(~solved)
+        i = np.flatnonzero(~solved & ~lost)
         if not len(i):
             break
         value, slope = function(x[i], i)
+        lost[i[np.isnan(value)]] = True
         above = value > 0.0
         beyond = (value < 0.0) & (x[i] >= high[i])
         high[i[above]], at_high[i[above]] = x[i[above]], value[above]
@@ -152,8 +153,14 @@ def bracket(
         tiny = np.maximum(4.0 * EPS * np.abs(x[i]), resolution[i])
         moved = np.abs(trial - x[i])
         done = inside & (moved <= np.maximum(np.where(known, last_step[i], 0.0), tiny))
-        done |= (high[i] - low[i] <= tiny) | (value == 0.0) | beyond
+        narrow = high[i] - low[i] <= tiny
+        # Whether there is a root at all is not known before the upper end has been looked at.
+        unseen = np.isnan(at_high[i]) & ~beyond & (value != 0.0) & (narrow | (done & (trial >= high[i])))
+        done = (done | narrow | (value == 0.0) | beyond) & ~unseen
         x[i] = np.where(value == 0.0, x[i], np.where(inside, trial, 0.5 * (low[i] + high[i])))
+        x[i[unseen]] = high[i[unseen]]
         x[i[beyond]] = np.nan
         solved[i[done]] = True
+    solved &= ~lost
+    x[~solved] = np.nan
     return x, solved

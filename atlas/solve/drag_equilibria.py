@@ -188,7 +188,10 @@ def _roots(system: System, gamma: float, x: Array, values: Array) -> Array:
         value, slope = _shoot_slopes(system, gamma, x)[4:] * rising[i]
         return value, slope
 
-    return bracket(radius, at[k], at[k + 1], last_step=LAST_STEP)[0]
+    found, solved = bracket(radius, at[k], at[k + 1], last_step=LAST_STEP)
+    if not solved.all():
+        raise ArithmeticError(f"{system}, gamma = {gamma:g}: {status.SENTENCES[status.NOT_CONVERGED]}")
+    return found
 
 
 def _extrema(x: Array, values: Array) -> tuple[Array, Array]:

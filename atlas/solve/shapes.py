@@ -93,19 +93,18 @@ def shape(
     """
     system = System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t)
     found = solve_equilibria(system, check_one("gamma", gamma))
-    median = len(found) // 2 if system.in_vacuum else -1
-    return shape_of(found, check_root(root, found.branch, found.expected, median), s)
+    return shape_of(found, root, s)
 
 
-def shape_of(found: Equilibria, k: int, s: ArrayLike | None = None) -> "xarray.Dataset":
+def shape_of(found: Equilibria, root: str | int = "expected", s: ArrayLike | None = None) -> "xarray.Dataset":
     """Shape, forces and tension of one of the equilibria that are known.
 
     Parameters
     ----------
     found : Equilibria
         From `towatlas.equilibria`.
-    k : int
-        Which of them, a row.
+    root : str or int
+        Which of them, as in `shape`.
     s : array_like, optional
         Arc lengths from the tow point over tow radius [-], as in `shape`.
 
@@ -117,7 +116,7 @@ def shape_of(found: Equilibria, k: int, s: ArrayLike | None = None) -> "xarray.D
     Raises
     ------
     ValueError
-        For a row that does not exist, and arc lengths off the cable.
+        For a root that does not exist, and arc lengths off the cable.
     ArithmeticError
         If the computation overflows.
 
@@ -129,8 +128,8 @@ def shape_of(found: Equilibria, k: int, s: ArrayLike | None = None) -> "xarray.D
     >>> curve.attrs["branch"], [round(float(z), 6) for z in curve.z]
     ('1 inner', [0.0, 4.943103, 9.487566])
     """
-    if not 0 <= k < len(found):
-        raise ValueError(f"k must be a row of the equilibria, from 0 to {len(found) - 1}; got {k!r}")
+    median = len(found) // 2 if found.system.in_vacuum else -1
+    k = check_root(root, found.branch, found.expected, median)
     lam = found.system.lam
     arc = np.linspace(0.0, lam, POINTS) if s is None else np.atleast_1d(check_real("s", s))
     if arc.ndim != 1 or not ((arc >= 0.0) & (arc <= lam)).all():
@@ -208,7 +207,10 @@ def _node_heights(found: Equilibria, k: int, line: Line) -> Array:
         columns = line(at)
         return columns[0] * rising[i], columns[-1] * rising[i]
 
-    return bracket(radius, height[before], height[before + 1], resolution=2e-16 * system.lam)[0]
+    crossed, solved = bracket(radius, height[before], height[before + 1], resolution=2e-16 * system.lam)
+    if not solved.all():
+        raise ArithmeticError(f"a node was not found to rounding: {status.SENTENCES[status.NOT_CONVERGED]}")
+    return crossed
 
 
 def _dataset(found: Equilibria, k: int, s: Array, columns: Array, s_node: Array, z_node: Array) -> "xarray.Dataset":
