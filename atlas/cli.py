@@ -46,6 +46,9 @@ def main(arguments: list[str] | None = None) -> int:
     except ArithmeticError as error:
         say(str(error))
         return FAILED
+    except MemoryError:
+        say("there is not enough memory for that many points")
+        return FAILED
     except BrokenPipeError:
         sys.stderr.close()
         return OK

@@ -180,6 +180,8 @@ def test_nothing_is_extrapolated(drag_file):
     assert np.isnan([bad.appears[:3], bad.error[:3], bad.C_cusp[:3]]).all()
     with pytest.raises(ValueError, match="lam = nan is not finite and positive"):
         table.folds(np.nan, 0.0, 0.01)
+    short = table.folds(2.0, 0.0, 0.1, 3)
+    assert short.status == short.status_ends == short.status_cusp == status.NO_TRANSITION
     gone = table.folds(13, 0.5, 2 * cusp)
     assert (gone.status, np.isnan(gone.error)) == (status.NO_PAIR, True)
     assert gone.sentence(of="ends") == status.SENTENCES[status.NO_PAIR]

@@ -302,6 +302,13 @@ def test_without_an_atlas(capsys, tmp_path):
     assert {row["source"] for row in json.loads(out)["critical_speeds"]} == {"solved"}
 
 
+def test_an_atlas_of_something_else(capsys, equilibria_path):
+    """A file without critical speeds is no reason to answer nothing: they are solved."""
+    code, out, _ = run(capsys, "scene", "skop-fig4", "--json", "--model", "vacuum", "--atlas", equilibria_path)
+    assert code == 0
+    assert {row["source"] for row in json.loads(out)["critical_speeds"]} == {"solved"}
+
+
 def test_a_cable_without_transitions(ask, tmp_path):
     file = tmp_path / "short.toml"
     text = "[cable]\n{}mass_per_length = 1\n[tow]\nradius = 1\nspeed = '2 kn'\n[fluid]\nname = 'vacuum'\n"

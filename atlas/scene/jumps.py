@@ -15,6 +15,7 @@ from towatlas.scene.pairs import PairSpeeds
 from towatlas.scene.scene import Scene
 from towatlas.solve.critical import solve_critical
 from towatlas.tables.atlas import Atlas
+from towatlas.tables.critical import CriticalTable
 
 # A jump is near where its speed is within this share of the scene's.
 NEAR = 0.1
@@ -154,7 +155,7 @@ def critical_speeds(*, lam: float, w_f: float, gamma: float, atlas: Atlas | None
 
 def _block(n: NDArray[np.int64], *, lam: float, w_f: float, atlas: Atlas | None) -> dict[str, NDArray]:
     names = ("gamma", "error", "status")
-    if atlas is None:
+    if atlas is None or CriticalTable.holds not in atlas.holds:
         there = np.zeros(len(n), bool)
         columns = {name: np.empty(len(n), np.int8 if name == "status" else float) for name in names}
     else:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.kernels import status
+from towatlas.limits import unchecked_excess_length
 from towatlas.numerics.axes import LinearAxis, LogAxis, ShiftedLogAxis
 from towatlas.numerics.chebyshev import at_points
 from towatlas.numerics.errormap import block_of
@@ -180,9 +181,13 @@ class DragFoldTable:
         self, good: NDArray[np.bool_], *, lam: Array, w_f: Array, C: Array, n: Integers
     ) -> dict[str, NDArray[Any]]:
         axes = self.axes
-        inside = good & (n <= self.n_max) & (lam >= axes.lam_min) & (lam <= axes.lam_max) & (w_f <= axes.w_f_max)
+        with np.errstate(invalid="ignore", over="ignore"):
+            absent = good & (unchecked_excess_length(lam=lam, w_f=w_f, n=n) <= 0.0)
+        inside = good & ~absent & (n <= self.n_max)
+        inside &= (lam >= axes.lam_min) & (lam <= axes.lam_max) & (w_f <= axes.w_f_max)
         table: dict[str, NDArray[Any]] = {name: np.full(len(n), np.nan) for name in NUMBERS}
-        unknown = np.where(good, status.OUTSIDE, status.BAD_INPUT).astype(np.int8)
+        unknown = np.full(len(n), status.OUTSIDE, np.int8)
+        unknown[~good], unknown[absent] = status.BAD_INPUT, status.NO_TRANSITION
         codes, codes_ends, codes_cusp = (unknown.copy() for _ in STATUSES)
         for order in np.unique(n[inside]):
             i = np.flatnonzero(inside & (n == order))
