@@ -193,6 +193,54 @@ def check_one(name: str, value: Any, *, zero: bool = False) -> float:
     return float(array)
 
 
+def check_finite(name: str, value: Any) -> float:
+    """One finite number.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in messages.
+    value : float
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        For others, and for arrays.
+    """
+    array = check_real(name, value)
+    if array.ndim:
+        raise ValueError(f"{name} must be one number, got an array of shape {array.shape}; call once for each")
+    if not np.isfinite(array):
+        raise ValueError(f"{name} must be finite, got {array:g}")
+    return float(array)
+
+
+def check_speed(value: Any) -> float:
+    """A speed gamma: one finite number that is not zero, negative in a turn to port.
+
+    Parameters
+    ----------
+    value : float
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        For others, and for arrays.
+    """
+    gamma = check_finite("gamma", value)
+    if gamma == 0.0:
+        raise ValueError("gamma must not be zero: positive in a turn to starboard, negative in one to port")
+    return gamma
+
+
 def check_root(root: Any, branch: NDArray[np.str_], expected: int, median: int = -1) -> int:
     """Row of an equilibrium named by a word, by its branch, or by its number.
 

@@ -78,26 +78,27 @@ class Equilibria:
     system : System
         The cable, its fish and the medium.
     gamma : float
-        Speed Omega sqrt(R/g) [-], > 0.
+        Speed Omega sqrt(R/g) [-], negative in a turn to port.
     R_x0, R_y0, R_z0 : ndarray, shape (equilibria,)
         Force of the cable at the tow point, pointing down it, over (mu + rho A) g R [-].
     x_f, y_f, z_f : ndarray, shape (equilibria,)
         Position of the fish over tow radius [-].
     r_f : ndarray, shape (equilibria,)
         Distance of the fish from the axis over tow radius [-], 0 to 1 + lam.
-    lag : ndarray, shape (equilibria,)
-        Angle of the fish behind the tow point [rad], -pi to pi; 0 or pi in a vacuum.
+    phase_deg : ndarray, shape (equilibria,)
+        Angle of the fish behind the tow point [deg], >= 0, carried along the cable and not wrapped: 180 for each node.
     tension : ndarray, shape (equilibria,)
         At the tow point, over (mu + rho A) g R [-], > 0.
     nodes : ndarray of int, shape (equilibria,)
         Sign changes of x along the cable [-], >= 0.
     branch : ndarray of str, shape (equilibria,)
-        In a vacuum "outward" for the shape without nodes, "n inner" and "n outer" for the members of the n-th pair.
-        With drag that of the shape in a vacuum from which it is continued, else "drag k", counted from the axis
-        outwards.
+        In a vacuum "outward" for the shape without nodes, "n inner" and "n outer" for the members of the n-th pair; in
+        a fluid "shape k", counted from the axis outwards.
     expected : int
         Row of the shape that is expected to be seen: in a vacuum the median root, after NRL Report 7048; with drag the
         one whose fish is nearest to the axis, which the median root becomes. -1 if none can be named.
+    near_axis : ndarray of bool, shape (equilibria,)
+        Whether the fish is nearer to the axis than half the tow radius, and than in every other shape.
     error : ndarray, shape (equilibria,)
         Estimated relative error of r_f [-], > 0.
     boundary_error : ndarray, shape (equilibria,)
@@ -116,11 +117,12 @@ class Equilibria:
     y_f: Array
     z_f: Array
     r_f: Array
-    lag: Array
+    phase_deg: Array
     tension: Array
     nodes: Integers
     branch: NDArray[np.str_]
     expected: int
+    near_axis: NDArray[np.bool_]
     error: Array
     boundary_error: Array
     searched: str

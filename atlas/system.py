@@ -1,13 +1,13 @@
 """A cable, its fish and the medium: the one form in which a problem is passed."""
 
 from dataclasses import astuple, dataclass, replace
-from math import isnan
+from math import inf, isnan
 
 import numpy as np
 from numpy.typing import NDArray
 
-from towatlas.checks import check_one, check_real
-from towatlas.kernels.system import COLUMNS, LAM, M_F, W_F, W
+from towatlas.checks import check_finite, check_one, check_real
+from towatlas.kernels.system import B_S, COLUMNS, LAM, M_F, W_F, W
 from towatlas.kernels.system import C as DRAG
 
 Array = NDArray[np.float64]
@@ -24,7 +24,7 @@ class System:
     lam : float
         Length of the cable over tow radius [-], > 0, Eq. (17).
     w_f : float
-        Weight of the fish in the fluid over (mu + rho A) g R [-], >= 0, Eq. (16a).
+        Weight of the fish in the fluid over (mu + rho A) g R [-], negative if it floats, Eq. (16a).
     m_f : float
         Mass of the fish, added mass included, over (mu + rho A) R [-], >= 0, Eq. (16b).
     C : float
@@ -35,6 +35,12 @@ class System:
         Weight of the cable in the fluid, (mu - rho A) / (mu + rho A) [-], above -1 and at most 1, Eq. (13a).
     C_t : float
         Tangential drag constant of the cable, as C with the coefficient of the flow along it [-], >= 0.
+    C_s : float
+        Side force constant of a stranded cable, rho d R a / (2 (mu + rho A)) [-], positive to starboard of the track;
+        a as in DTMB Report 713, where the coefficient of the side force is a sin(phi) / (1 + (sin(phi) / b_s)^2).
+    b_s : float
+        Sine of the angle between cable and stream at which the side force is at its largest [-], > 0; inf for a force
+        that grows with the sine.
     """
 
     lam: float
@@ -44,6 +50,8 @@ class System:
     C_f: float = 0.0
     w: float = 1.0
     C_t: float = 0.0
+    C_s: float = 0.0
+    b_s: float = inf
 
     @classmethod
     def of(
@@ -56,6 +64,8 @@ class System:
         C_f: float = 0.0,
         w: float = 1.0,
         C_t: float = 0.0,
+        C_s: float = 0.0,
+        b_s: float = inf,
     ) -> "System":
         """A system of numbers in range.
 
@@ -64,7 +74,7 @@ class System:
         lam : float
             Cable length over tow radius [-], > 0.
         w_f : float
-            Fish weight over (mu + rho A) g R [-], >= 0.
+            Fish weight over (mu + rho A) g R [-]; negative for a fish that floats, whose m_f then has to be given.
         C : float
             Drag constant of the cable [-], >= 0.
         m_f : float, optional
@@ -75,6 +85,8 @@ class System:
             Weight of the cable [-], above -1 and at most 1.
         C_t : float
             Tangential drag constant of the cable [-], >= 0.
+        C_s, b_s : float
+            Side force constant of a stranded cable [-], and the sine at which that force is at its largest, > 0.
 
         Returns
         -------
@@ -83,22 +95,26 @@ class System:
         Raises
         ------
         ValueError
-            For numbers out of range, what is not one number, and a cable without weight and without a fish.
+            For numbers out of range, what is not one number, and a cable that nothing holds down or up.
 
         Examples
         --------
         >>> System.of(37.8, 1352, C=0.018).in_vacuum
         False
         """
-        weight = check_real("w", w)
+        weight, sharp = check_real("w", w), check_real("b_s", b_s)
         if weight.ndim or not -1.0 < weight <= 1.0:
             raise ValueError(f"w = (mu - rho A) / (mu + rho A) must be one number above -1 and at most 1, got {w!r}")
-        lam, w_f = check_one("lam", lam), check_one("w_f", w_f, zero=True)
-        m_f = w_f if m_f is None else check_one("m_f", m_f, zero=True)
-        if weight <= 0.0 and w_f == m_f == 0.0:
+        if sharp.ndim or not sharp > 0.0:
             raise ValueError(
-                "a cable without weight (w <= 0) and without a fish has no shape to hang in; give it a fish"
+                f"b_s, the sine at which the side force is largest, must be one positive number, got {b_s!r}"
             )
+        lam, w_f = check_one("lam", lam), check_finite("w_f", w_f)
+        if m_f is None and w_f < 0.0:
+            raise ValueError(f"w_f = {w_f:g} is a fish lighter than the fluid, whose mass is its own: give m_f")
+        m_f = w_f if m_f is None else check_one("m_f", m_f, zero=True)
+        if weight == 0.0 and w_f == 0.0:
+            raise ValueError("w = 0 and w_f = 0: nothing holds the cable down or up, it has no shape to hang in")
         return cls(
             lam=lam,
             w_f=w_f,
@@ -107,6 +123,8 @@ class System:
             C_f=check_one("C_f", C_f, zero=True),
             w=float(weight),
             C_t=check_one("C_t", C_t, zero=True),
+            C_s=check_finite("C_s", C_s),
+            b_s=float(sharp),
         )
 
     def __str__(self) -> str:
@@ -160,5 +178,5 @@ def nondense_rows(*, lam: Array, w_f: Array, C: Array) -> Array:
         In the order of `towatlas.kernels.system.COLUMNS`.
     """
     rows = np.zeros((len(lam), len(COLUMNS)))
-    rows[:, LAM], rows[:, W_F], rows[:, M_F], rows[:, DRAG], rows[:, W] = lam, w_f, w_f, C, 1.0
+    rows[:, LAM], rows[:, W_F], rows[:, M_F], rows[:, DRAG], rows[:, W], rows[:, B_S] = lam, w_f, w_f, C, 1.0, inf
     return rows

@@ -200,8 +200,8 @@ def helper(function: Callable) -> Callable:
 
 
 def kernel(function: Callable) -> Callable:
-    """Compile a serial kernel that Python calls; kept on disk."""
-    return _compiled(function)
+    """Compile a serial kernel that Python calls, several threads at a time if they like; kept on disk."""
+    return _compiled(function, nogil=True)
 
 
 # One parallel kernel at a time: each takes all threads anyway, and of numba's threading layers workqueue, the one that

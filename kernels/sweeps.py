@@ -4,11 +4,12 @@ Every row is written by index and computed the same way wherever it falls, so th
 bit for any number of threads. One parallel call costs about a millisecond: for a few rows call the serial kernel.
 """
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numba
-import numpy as np
 
 from towatlas.kernels.compiling import parallel_kernel
-from towatlas.kernels.drag import STATE, Algebra, Reached, Shots, shoot_drag
+from towatlas.kernels.drag_shots import Algebra, Reached, Shots, shoot_drag
 from towatlas.kernels.folds import Cables, Folds, solve_folds
 from towatlas.kernels.lanes import march
 from towatlas.kernels.scan import forward_shots, scan_system
@@ -17,6 +18,8 @@ from towatlas.kernels.scan import forward_shots, scan_system
 SHOTS_BLOCK = 256
 FOLDS_BLOCK = 128
 FORWARD_BLOCK = 1024
+# Shots with drag between two looks at the clock: at their longest, seconds.
+DRAG_BLOCK = 128
 
 
 def _march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts, statuses):
@@ -61,16 +64,24 @@ def _scan_systems(lam, w_f, gamma_low, gamma_high, speeds, guesses, segments, n_
         )
 
 
-def _shoot_drag(r, gamma2, systems, shares, products, places, degree, max_steps, state, steps, statuses):
-    none = np.empty((0, STATE - 1))
-    # A shot takes milliseconds: one a block.
-    for row in numba.prange(len(r)):
-        shots, reached = Shots(r, gamma2, systems, shares), Reached(state, steps, statuses)
-        shoot_drag(shots, Algebra(products, places, degree), max_steps, none, reached, row, row + 1)
+def shoot_drag_threads(shots: Shots, algebra: Algebra, max_steps: int, reached: Reached) -> None:
+    """`shoot_drag` over blocks of rows, on as many threads as numba is allowed."""
+    rows = len(shots.r)
+    begins = range(0, rows, DRAG_BLOCK)
+    threads = min(len(begins), numba.get_num_threads())
+
+    def shoot(begin: int) -> None:
+        shoot_drag(shots, algebra, max_steps, reached, begin, min(rows, begin + DRAG_BLOCK))
+
+    if threads < 2:
+        for begin in begins:
+            shoot(begin)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(shoot, begins))
 
 
 march_parallel = parallel_kernel(_march)
 solve_folds_parallel = parallel_kernel(_solve_folds)
 forward_shots_parallel = parallel_kernel(_forward_shots)
 scan_systems_parallel = parallel_kernel(_scan_systems)
-shoot_drag_parallel = parallel_kernel(_shoot_drag)

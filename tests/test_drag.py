@@ -19,9 +19,9 @@ from towatlas.kernels import status
 from towatlas.kernels.series import FIRST, ORDER
 from towatlas.report.page import PHOTOGRAPHS
 from towatlas.solve.drag_equilibria import solve_drag_equilibria
-from towatlas.solve.drag_shots import shoot
 from towatlas.solve.jets import jets_of
 from towatlas.solve.shapes import shape_of
+from towatlas.solve.shots import shoot
 from towatlas.system import System
 
 
@@ -222,7 +222,7 @@ def test_straight_trailing_cable(w):
 
 def test_jets_are_derivatives():
     """To fourth order in the difference, on a shot with every term switched on."""
-    jets, r, gamma, h = jets_of(3, gamma=True, drag=True), 3.0, 0.9, 1e-3
+    jets, r, gamma, h = jets_of(3, gamma=True, parameter=True), 3.0, 0.9, 1e-3
     jet = shoot([r], gamma, FULL.row(), jets).log_rho[0]
 
     def shifted(log_r=0.0, log_gamma=0.0, log_drag=0.0):

@@ -105,7 +105,7 @@ def test_cusps_within_their_error(lam, w_f, n):
     around = [reference_drag.shot(np.exp(log_r + k * H) / gamma**2, gamma, system)[:2] for k in range(-4, 5)]
     values = np.array([np.log(x * x + y * y) / 2 for x, y in around])
     residual = np.array([values[4], FIRST @ values / H, SECOND @ values / (2 * H * H)], float)
-    _, jacobian = _cusp_equations(cusps, **cable, parallel=False)
+    _, jacobian = _cusp_equations(cusps, **cable)
     moved = np.linalg.solve(jacobian[0], -residual)[2]
     error = cusp_errors(cusps, **cable)[0]
     assert abs(moved) <= error < 1e-9

@@ -163,11 +163,11 @@ def _traced(cables: Cables, sigma: Array, bar: tqdm) -> tuple[Array, Array]:
     statuses = []
     for first in range(0, len(cables), BATCH):
         part = cables.part(np.arange(first, min(first + BATCH, len(cables))))
-        some, codes = trace_folds(lam=part.lam, w_f=part.w_f, n=np.full(len(part), part.n), parallel=True)
+        some, codes = trace_folds(lam=part.lam, w_f=part.w_f, n=np.full(len(part), part.n))
         curves += some
         statuses.append(codes)
         bar.update(len(part))
-    cusps, codes = solve_cusps(curves, np.concatenate(statuses), lam=cables.lam, w_f=cables.w_f, parallel=True)
+    cusps, codes = solve_cusps(curves, np.concatenate(statuses), lam=cables.lam, w_f=cables.w_f)
     if (codes != status.OK).any():
         k = int(np.flatnonzero(codes != status.OK)[0])
         raise ArithmeticError(
@@ -193,7 +193,7 @@ def _predicted(cables: Cables, series: Series, axes: DragAxes, sigma: Array, bar
     """The same by Newton from what a series with fewer nodes says; cables for which that fails are traced."""
     guess = series.guess(axes.sigma.coordinate(np.zeros(1))[0], cables.y, cables.x)
     start = np.stack([*guess, series.log_cusp(cables.y, cables.x)], axis=1)
-    cusps, codes = polish_cusps(start, lam=cables.lam, w_f=cables.w_f, parallel=True)
+    cusps, codes = polish_cusps(start, lam=cables.lam, w_f=cables.w_f)
     good = (codes == status.OK) & (np.abs(cusps - start).max(axis=1) < STRAYED)
     log_c = _log_drag(cusps[:, 2], sigma)
     folds = np.stack([series.guess(s, cables.y, cables.x).T for s in axes.sigma.coordinate(sigma)], axis=1)
@@ -218,7 +218,7 @@ def _folds(cables: Cables, guess: Array, log_c: Array) -> tuple[Array, NDArray[n
     """log gamma and log r_f, shape (2, cables, sigma), from guesses of log r and log gamma; and which are solved."""
     count = log_c.shape[1]
     systems = nondense_rows(lam=np.repeat(cables.lam, count), w_f=np.repeat(cables.w_f, count), C=np.exp(log_c.ravel()))
-    z, _, codes = fold_at(guess.reshape(-1, 2), systems, parallel=True, settled_at=LAST_STEP)
+    z, _, codes = fold_at(guess.reshape(-1, 2), systems, settled_at=LAST_STEP)
     z = z.reshape(*log_c.shape, 2)
     return np.stack([z[:, :, 1], z[:, :, 0] - 2.0 * z[:, :, 1]]), (codes == status.OK).reshape(log_c.shape)
 

@@ -14,7 +14,7 @@ from towatlas.tables.file import default_path
 
 OK, FAILED, USAGE, OUTSIDE, NO_STATE, FILE = 0, 1, 2, 3, 4, 5
 # Of what --json prints; raised when a key changes its name or its meaning, or goes.
-JSON_SCHEMA = 2
+JSON_SCHEMA = 3
 
 
 def number(text: str) -> float:
@@ -38,6 +38,20 @@ def speed(text: str) -> float:
     value = number(text)
     if value <= 0.0:
         raise argparse.ArgumentTypeError(f"gamma = {text} is not positive")
+    return value
+
+
+def turn(text: str) -> float:
+    value = number(text)
+    if value == 0.0:
+        raise argparse.ArgumentTypeError("gamma = 0: positive in a turn to starboard, negative in one to port")
+    return value
+
+
+def sine(text: str) -> float:
+    value = float("inf") if text == "inf" else number(text)
+    if value <= 0.0:
+        raise argparse.ArgumentTypeError(f"{text} is not positive")
     return value
 
 
@@ -78,15 +92,18 @@ FLUID = (
     ("C-f", drag, "drag constant of the fish, (1/2) rho C_Df A_f / (mu + rho A)"),
     ("w", number, "weight of the cable, (mu - rho A) / (mu + rho A); default 1"),
     ("C-t", drag, "tangential drag constant of the cable"),
+    ("C-s", number, "side force constant of a stranded cable, rho d R a / (2 (mu + rho A)), positive to starboard"),
+    ("b-s", sine, "sine at which the side force is largest; default inf"),
 )
 
 
-def add_cable(parser: argparse.ArgumentParser, gamma: bool = True) -> None:
-    """The cable, its fish and its speed."""
+def add_cable(parser: argparse.ArgumentParser, gamma: bool = True, any_medium: bool = False) -> None:
+    """The cable, its fish and its speed; in any medium a fish may float and a turn go to port."""
+    fish, rate = (number, turn) if any_medium else (weight, speed)
     parser.add_argument("--lam", type=length, required=True, metavar="LAMBDA", help=EQUILIBRIUM["lam"].long_name)
-    parser.add_argument("--wf", type=weight, required=True, metavar="W_F", help=EQUILIBRIUM["w_f"].long_name)
+    parser.add_argument("--wf", type=fish, required=True, metavar="W_F", help=EQUILIBRIUM["w_f"].long_name)
     if gamma:
-        parser.add_argument("--gamma", type=speed, required=True, metavar="GAMMA", help=EQUILIBRIUM["gamma"].long_name)
+        parser.add_argument("--gamma", type=rate, required=True, metavar="GAMMA", help=EQUILIBRIUM["gamma"].long_name)
 
 
 def add_fluid(parser: argparse.ArgumentParser) -> None:

@@ -7,7 +7,7 @@ from towatlas.commands.common import OK, add_cable, add_fluid, fluid, print_json
 from towatlas.results import Equilibria
 from towatlas.solve.equilibria import equilibria
 
-NUMBERS = ("R_x0", "R_y0", "R_z0", "x_f", "y_f", "z_f", "r_f", "lag", "tension", "error", "boundary_error")
+NUMBERS = ("R_x0", "R_y0", "R_z0", "x_f", "y_f", "z_f", "r_f", "phase_deg", "tension", "error", "boundary_error")
 
 
 def add(commands: Any) -> None:
@@ -19,7 +19,7 @@ def add(commands: Any) -> None:
         "Eq. (33) of a forward Runge-Kutta shot, an independent witness. With any of the options of a fluid: what a "
         "search finds, and what was searched.",
     )
-    add_cable(parser)
+    add_cable(parser, any_medium=True)
     add_fluid(parser)
     parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
     parser.set_defaults(run=_run)
@@ -42,6 +42,7 @@ def _row(found: Equilibria, k: int) -> dict[str, Any]:
         "branch": str(found.branch[k]),
         "nodes": int(found.nodes[k]),
         "expected": k == found.expected,
+        "near_axis": bool(found.near_axis[k]),
     }
     return row | {name: real(getattr(found, name)[k]) for name in NUMBERS}
 

@@ -22,7 +22,7 @@ COLUMNS = {
     "x_f_m": "x_f",
     "y_f_m": "y_f",
     "z_f_m": "z_f",
-    "lag_deg": "lag_deg",
+    "phase_deg": "phase_deg",
     "tension_N": "tension",
     "R_x0_N": "R_x0",
 }
@@ -143,9 +143,9 @@ def _equilibria(answer: SceneAnswer) -> list[dict[str, Any]]:
     rows = []
     for k in range(len(found)):
         row: dict[str, Any] = {"branch": str(found.branch[k]), "nodes": int(found.nodes[k])}
-        row["expected"] = k == found.expected
+        row |= {"expected": k == found.expected, "near_axis": bool(found.near_axis[k])}
         row |= {f"{name}_m": float(getattr(found, name)[k] * scene.radius) for name in ("r_f", "x_f", "y_f", "z_f")}
-        row["lag_deg"] = math.degrees(found.lag[k])
+        row["phase_deg"] = float(found.phase_deg[k])
         row["tension_N"] = float(found.tension[k] * force)
         row |= {f"{name}_N": float(getattr(found, name)[k] * force) for name in ("R_x0", "R_y0", "R_z0")}
         row["R_x0"] = float(found.R_x0[k])
@@ -241,7 +241,9 @@ def text_of(answer: SceneAnswer) -> str:
     lines += ["", *_model_lines(answer.choice), "", *_jump_lines(answer), ""]
     if _pairs(answer):
         lines += [*_pair_lines(answer), ""]
-    lines.append(f"equilibria ({answer.choice.model} model), the fish in m, forces in N, its lag behind the tow point")
+    lines.append(
+        f"equilibria ({answer.choice.model} model), the fish in m, forces in N, its phase behind the tow point"
+    )
     lines.append(f"{'branch':>8} {'nodes':>5} " + " ".join(f"{name:>13}" for name in COLUMNS.values()))
     for row in _equilibria(answer):
         cells = " ".join(f"{_cell(row[name], 8):>13}" for name in COLUMNS)

@@ -33,7 +33,7 @@ def add(commands: Any) -> None:
         description="Position, force and tension along the cable in one of its equilibria: as a table on standard "
         "output, or as a file or a figure.",
     )
-    add_cable(parser)
+    add_cable(parser, any_medium=True)
     add_fluid(parser)
     parser.add_argument(
         "--root",

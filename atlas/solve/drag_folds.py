@@ -20,14 +20,16 @@ from towatlas.numerics.curves import Curve, Steps, follow
 from towatlas.numerics.rows import EPS, newton, solve_systems
 from towatlas.results import DragFolds
 from towatlas.solve.critical import solve_rows
-from towatlas.solve.drag_shots import Array, Integers, shoot
 from towatlas.solve.jets import jets_of
+from towatlas.solve.shots import Array, Integers, direction_of, shoot
 from towatlas.system import nondense_rows
 
-FOLD = jets_of(2, gamma=True, drag=True)
+FOLD = jets_of(2, gamma=True, parameter=True)
 AT_DRAG = jets_of(2, gamma=True)
-CUSP = jets_of(3, gamma=True, drag=True)
+CUSP = jets_of(3, gamma=True, parameter=True)
 
+# The number that the parameter moves, by its logarithm.
+DRAG = ("C",)
 GAMMA_MAX = 50.0
 # Drag so small that the vacuum's fold is a first guess of it.
 FAINT = 1e-6
@@ -40,7 +42,7 @@ SETTLED = 1e-11
 Booleans = NDArray[np.bool_]
 
 
-def trace_folds(*, lam: Array, w_f: Array, n: Integers, parallel: bool = False) -> tuple[list[Curve], Integers]:
+def trace_folds(*, lam: Array, w_f: Array, n: Integers) -> tuple[list[Curve], Integers]:
     """Curves of folds of the rows given, from the vacuum over the cusp to the highest speed or the next turn of C.
 
     Parameters
@@ -49,8 +51,6 @@ def trace_folds(*, lam: Array, w_f: Array, n: Integers, parallel: bool = False) 
         Cable length and fish weight [-]; no checks.
     n : ndarray of int, shape (rows,)
         Number of the transition.
-    parallel : bool
-        Shots on all threads.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def trace_folds(*, lam: Array, w_f: Array, n: Integers, parallel: bool = False) 
 
     def equations(z: Array, i: Integers) -> tuple[Array, Array, Array, Booleans]:
         systems = nondense_rows(lam=lam[i], w_f=w_f[i], C=np.exp(z[:, 2]))
-        ends = shoot(np.exp(z[:, 0]), np.exp(z[:, 1]), systems, FOLD, parallel)
+        ends = shoot(np.exp(z[:, 0]), np.exp(z[:, 1]), systems, FOLD, directions=direction_of(DRAG, systems))
         jet, at = ends.log_rho, FOLD.at
         second = 2.0 * jet[:, at(2, 0, 0)]
         value = np.stack([jet[:, 0], jet[:, at(1, 0, 0)]], axis=1)
@@ -87,9 +87,7 @@ def trace_folds(*, lam: Array, w_f: Array, n: Integers, parallel: bool = False) 
     return curves, codes
 
 
-def solve_cusps(
-    curves: list[Curve], codes: Integers, *, lam: Array, w_f: Array, parallel: bool = False
-) -> tuple[Array, Integers]:
+def solve_cusps(curves: list[Curve], codes: Integers, *, lam: Array, w_f: Array) -> tuple[Array, Integers]:
     """Cusps of curves that were traced.
 
     Parameters
@@ -100,8 +98,6 @@ def solve_cusps(
         Their statuses.
     lam, w_f : ndarray, shape (rows,)
         Cable length and fish weight [-].
-    parallel : bool
-        Shots on all threads.
 
     Returns
     -------
@@ -117,11 +113,11 @@ def solve_cusps(
             codes[row] = status.NO_CUSP if k < 0 else status.NOT_CONVERGED
             if k >= 0:
                 z[row] = curve.at_event(k)
-    solved, solved_codes = polish_cusps(z, lam=lam, w_f=w_f, parallel=parallel)
+    solved, solved_codes = polish_cusps(z, lam=lam, w_f=w_f)
     return solved, np.where(np.isfinite(z).all(axis=1), solved_codes, codes)
 
 
-def polish_cusps(z: Array, *, lam: Array, w_f: Array, parallel: bool = False) -> tuple[Array, Integers]:
+def polish_cusps(z: Array, *, lam: Array, w_f: Array) -> tuple[Array, Integers]:
     """Cusps near guesses, where log rho and its first two slopes vanish, by Newton.
 
     Parameters
@@ -130,8 +126,6 @@ def polish_cusps(z: Array, *, lam: Array, w_f: Array, parallel: bool = False) ->
         Guesses of log r, log gamma, log C; rows with a nan are passed over.
     lam, w_f : ndarray, shape (rows,)
         Cable length and fish weight [-].
-    parallel : bool
-        Shots on all threads.
 
     Returns
     -------
@@ -142,7 +136,7 @@ def polish_cusps(z: Array, *, lam: Array, w_f: Array, parallel: bool = False) ->
     """
 
     def residuals(z: Array, i: Integers) -> tuple[Array, Array, Booleans]:
-        return *_cusp_equations(z, lam=lam[i], w_f=w_f[i], parallel=parallel), np.ones(len(z), bool)
+        return *_cusp_equations(z, lam=lam[i], w_f=w_f[i]), np.ones(len(z), bool)
 
     found, _, solved = newton(
         residuals, z, rounds=ROUNDS, longest=1.0, settled=lambda step, size, last: size < np.sqrt(SETTLED)
@@ -154,7 +148,7 @@ def cusp_errors(z: Array, *, lam: Array, w_f: Array) -> Array:
     """Estimated relative errors of C at cusps: twice what one more step of Newton would move it by, and rounding."""
     errors = np.full(len(z), np.nan)
     i = np.flatnonzero(np.isfinite(z).all(axis=1))
-    value, jacobian = _cusp_equations(z[i], lam=lam[i], w_f=w_f[i], parallel=False)
+    value, jacobian = _cusp_equations(z[i], lam=lam[i], w_f=w_f[i])
     step = solve_systems(jacobian, -value)
     # log rho and its slope alone fix speed and drag at the cusp: what their rounding moves log C by.
     along, bent = jacobian[:, 0], jacobian[:, 1]
@@ -166,11 +160,11 @@ def cusp_errors(z: Array, *, lam: Array, w_f: Array) -> Array:
     return errors
 
 
-def _cusp_equations(z: Array, *, lam: Array, w_f: Array, parallel: bool) -> tuple[Array, Array]:
+def _cusp_equations(z: Array, *, lam: Array, w_f: Array) -> tuple[Array, Array]:
     """log rho and its first two slopes, and their Jacobian in log r, log gamma, log C."""
     at = CUSP.at
     systems = nondense_rows(lam=lam, w_f=w_f, C=np.exp(z[:, 2]))
-    jet = shoot(np.exp(z[:, 0]), np.exp(z[:, 1]), systems, CUSP, parallel).log_rho
+    jet = shoot(np.exp(z[:, 0]), np.exp(z[:, 1]), systems, CUSP, directions=direction_of(DRAG, systems)).log_rho
     along = [((k + 1) * jet[:, at(k + 1, 0, 0)], jet[:, at(k, 1, 0)], jet[:, at(k, 0, 1)]) for k in range(3)]
     return jet[:, [at(k, 0, 0) for k in range(3)]], np.stack([np.stack(row, axis=1) for row in along], axis=1)
 
@@ -213,9 +207,7 @@ def crossing(curve: Curve, log_c: float, before: bool) -> Array | None:
     return None
 
 
-def fold_at(
-    guess: Array, systems: Array, *, parallel: bool = False, settled_at: float = SETTLED
-) -> tuple[Array, Array, Integers]:
+def fold_at(guess: Array, systems: Array, *, settled_at: float = SETTLED) -> tuple[Array, Array, Integers]:
     """Folds of systems near guesses, by Newton.
 
     Parameters
@@ -224,8 +216,6 @@ def fold_at(
         log r and log gamma; rows with a nan are passed over.
     systems : ndarray, shape (rows, columns)
         As of `System.row`.
-    parallel : bool
-        Shots on all threads.
     settled_at : float
         Newton's last step is at most this long, in log r and log gamma.
 
@@ -242,7 +232,7 @@ def fold_at(
     along_gamma = np.full(len(guess), np.nan)
 
     def residuals(z: Array, i: Integers) -> tuple[Array, Array, Booleans]:
-        ends = shoot(np.exp(z[:, 0]), np.exp(z[:, 1]), systems[i], AT_DRAG, parallel)
+        ends = shoot(np.exp(z[:, 0]), np.exp(z[:, 1]), systems[i], AT_DRAG)
         jet = ends.log_rho
         along_gamma[i] = jet[:, at(0, 1, 0)]
         sound = (ends.status == status.OK) & np.isfinite(jet).all(axis=1)
@@ -257,7 +247,7 @@ def fold_at(
         # At a fold gamma depends on r to the second order only: gamma is done before r.
         return (size < settled_at) | (np.abs(step[:, 1]) < SETTLED) & (size > 0.5 * last) & (size < 1e-4)
 
-    known = np.asarray(np.isfinite(systems).all(axis=1))
+    known = np.asarray(~np.isnan(systems).any(axis=1))
     guess = np.where(known[:, None], guess, np.nan)
     z, step, solved = newton(residuals, guess, rounds=3 * ROUNDS, longest=1.0, settled=settled)
     error = np.where(solved, np.abs(step[:, 1]) + ROUNDINGS * EPS / np.abs(along_gamma), np.nan)

@@ -1,14 +1,16 @@
 """All equilibria of one cable at one speed."""
 
+from math import inf
+
 import numpy as np
 from numpy.typing import NDArray
 
-from towatlas.checks import check_one
+from towatlas.checks import check_speed
 from towatlas.kernels import status
 from towatlas.limits import threshold_offset, unchecked_excess_length
 from towatlas.results import Equilibria
 from towatlas.solve.critical import solve_rows
-from towatlas.solve.drag_equilibria import solve_drag_equilibria
+from towatlas.solve.drag_equilibria import NEAR_AXIS, solve_drag_equilibria
 from towatlas.solve.members import Members, extrema, shoot_lanes, shoot_singly, solve_members
 from towatlas.system import System
 
@@ -33,6 +35,8 @@ def equilibria(
     C_f: float = 0.0,
     w: float = 1.0,
     C_t: float = 0.0,
+    C_s: float = 0.0,
+    b_s: float = inf,
 ) -> Equilibria:
     """Equilibria of a towed cable: all of them in a vacuum, those that a search finds in a fluid.
 
@@ -41,9 +45,10 @@ def equilibria(
     lam : float
         Cable length over tow radius [-], > 0.
     w_f : float
-        Fish weight over (mu + rho A) g R [-], >= 0.
+        Fish weight over (mu + rho A) g R [-]; negative for a fish that floats, whose m_f then has to be given.
     gamma : float
-        Rotational frequency Omega sqrt(R/g) [-], > 0.
+        Rotational frequency Omega sqrt(R/g) [-]: positive in a turn to starboard, negative in one to port, which is its
+        mirror image but for a side force.
     C : float
         Drag constant of the cable, (1/2) rho C_D d R / (mu + rho A) [-], >= 0.
     m_f : float, optional
@@ -54,12 +59,17 @@ def equilibria(
         Weight of the cable, (mu - rho A) / (mu + rho A) [-], above -1, at most 1; 1 in a nondense fluid.
     C_t : float
         Tangential drag constant of the cable, as C with the coefficient of the flow along it [-], >= 0.
+    C_s : float
+        Side force constant of a stranded cable, rho d R a / (2 (mu + rho A)) [-], positive to starboard of the track.
+    b_s : float
+        Sine of the angle between cable and stream at which the side force is at its largest [-], > 0; inf for a force
+        that grows with the sine.
 
     Returns
     -------
     Equilibria
-        In a vacuum, where the last five have their defaults: all of them, an odd number. In a fluid: those that
-        continuation from a vacuum and a search in the radius of the fish find; `searched` says what was searched.
+        In a vacuum, where all from C have their defaults: all of them, an odd number. In a fluid: those that a search
+        in the radius of the fish finds; `searched` says what was searched.
 
     Raises
     ------
@@ -77,7 +87,7 @@ def equilibria(
     References
     ----------
     NRL Report 7048, Eqs. (29)-(35), with drag (12)-(23); median root, section "The character of the solutions for
-    lambda > lambda_c".
+    lambda > lambda_c". The side force: DTMB Report 713, 1950.
 
     Examples
     --------
@@ -88,8 +98,8 @@ def equilibria(
     >>> [round(float(r), 4) for r in found.r_f], [int(n) for n in found.nodes], found.expected
     ([36.8139, 0.0435, 38.7821], [1, 1, 0], 1)
     """
-    system = System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t)
-    return solve_equilibria(system, check_one("gamma", gamma))
+    system = System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t, C_s=C_s, b_s=b_s)
+    return solve_equilibria(system, check_speed(gamma))
 
 
 def solve_equilibria(system: System, gamma: float) -> Equilibria:
@@ -99,7 +109,7 @@ def solve_equilibria(system: System, gamma: float) -> Equilibria:
     ----------
     system : System
     gamma : float
-        Speed Omega sqrt(R/g) [-], > 0.
+        Speed Omega sqrt(R/g) [-], negative in a turn to port.
 
     Returns
     -------
@@ -110,11 +120,10 @@ def solve_equilibria(system: System, gamma: float) -> Equilibria:
     ArithmeticError
         If the computation overflows, does not converge, or would take minutes (HALF_WAVES).
     """
-    nodes, outer, found = _all_members(system, gamma)
-    branch = branch_names(nodes, outer)
     if not system.in_vacuum:
-        # The vacuum of the report, m_f = w_f and w = 1, is where the equilibria are continued from.
-        return solve_drag_equilibria(system, gamma, np.abs(found.x_f), branch)
+        return solve_drag_equilibria(system, gamma)
+    nodes, outer, found = _all_members(system, abs(gamma))
+    branch = branch_names(nodes, outer)
     order = np.argsort(found.R_x0)
     r_x0, x_f = np.ascontiguousarray(found.R_x0[order]), found.x_f[order]
     rows = len(order)
@@ -128,13 +137,14 @@ def solve_equilibria(system: System, gamma: float) -> Equilibria:
         y_f=np.zeros(rows),
         z_f=found.z_f[order],
         r_f=np.abs(x_f),
-        lag=np.where(x_f < 0.0, np.pi, 0.0),
+        phase_deg=180.0 * nodes[order],
         tension=np.hypot(system.w_f + system.lam, r_x0),
         nodes=nodes[order],
         branch=branch[order],
         expected=rows // 2,
+        near_axis=(np.abs(x_f) < NEAR_AXIS) & (np.abs(x_f) == np.abs(x_f).min()),
         error=found.error[order],
-        boundary_error=_boundary_errors(system, gamma, r_x0),
+        boundary_error=_boundary_errors(system, abs(gamma), r_x0),
         searched="all: as many as the zeros of the first variation say",
     )
 

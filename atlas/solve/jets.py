@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-# Exponents of log r (radius of the fish), log gamma and log C.
+# Exponents of log r (radius of the fish), log gamma and a parameter of the system.
 Monomial = tuple[int, int, int]
 
 
 @dataclass(frozen=True)
 class Jets:
-    """Monomials of a truncated polynomial algebra in log r, log gamma and log C.
+    """Monomials of a truncated polynomial algebra in log r, log gamma and a parameter.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Jets:
         Parameters
         ----------
         *monomial : int
-            Exponents of log r, log gamma and log C.
+            Exponents of log r, log gamma and a parameter.
 
         Returns
         -------
@@ -53,15 +53,15 @@ class Jets:
         return self.monomials.index(monomial)  # type: ignore[arg-type]
 
 
-def jets_of(degree: int, gamma: bool = False, drag: bool = False) -> Jets:
-    """Jets to a degree in log r, and to the first in log gamma and in log C (with r to one degree less).
+def jets_of(degree: int, gamma: bool = False, parameter: bool = False) -> Jets:
+    """Jets to a degree in log r, and to the first in log gamma and in the parameter (with r to one degree less).
 
     Parameters
     ----------
     degree : int
         In log r, >= 0.
-    gamma, drag : bool
-        Whether log gamma and log C are among the unknowns.
+    gamma, parameter : bool
+        Whether log gamma and a parameter of the system are among the unknowns.
 
     Returns
     -------
@@ -74,7 +74,7 @@ def jets_of(degree: int, gamma: bool = False, drag: bool = False) -> Jets:
     """
     monomials: list[Monomial] = [(k, 0, 0) for k in range(degree + 1)]
     monomials += [(k, 1, 0) for k in range(degree) if gamma]
-    monomials += [(k, 0, 1) for k in range(degree) if drag]
+    monomials += [(k, 0, 1) for k in range(degree) if parameter]
     # The kernels solve for one monomial after the other: those of lower degree come first.
     monomials.sort(key=lambda m: (sum(m), m[::-1]))
     at = {m: n for n, m in enumerate(monomials)}

@@ -1,19 +1,20 @@
 """The shape of one equilibrium: position, force and tension along the cable."""
 
 from collections.abc import Callable
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from towatlas.checks import check_one, check_real, check_root
+from towatlas.checks import check_real, check_root, check_speed
 from towatlas.kernels import status
 from towatlas.numerics.rows import bracket
 from towatlas.results import Equilibria
-from towatlas.solve.drag_equilibria import raise_failures
-from towatlas.solve.drag_shots import trace
 from towatlas.solve.equilibria import solve_equilibria
+from towatlas.solve.jets import jets_of
 from towatlas.solve.members import shoot_singly
+from towatlas.solve.shots import shoot
 from towatlas.system import System
 
 if TYPE_CHECKING:
@@ -41,6 +42,8 @@ def shape(
     C_f: float = 0.0,
     w: float = 1.0,
     C_t: float = 0.0,
+    C_s: float = 0.0,
+    b_s: float = inf,
 ) -> "xarray.Dataset":
     """Shape, forces and tension of one equilibrium of a towed cable.
 
@@ -58,7 +61,7 @@ def shape(
     s : array_like, optional
         Arc lengths from the tow point over tow radius [-], from 0 to lam in any order; 401 of them, evenly spaced, by
         default.
-    C, m_f, C_f, w, C_t : float
+    C, m_f, C_f, w, C_t, C_s, b_s : float
         The fluid, as in `equilibria`; a vacuum by default.
 
     Returns
@@ -91,8 +94,8 @@ def shape(
     >>> [round(float(x), 6) for x in curve.x]
     [1.0, 0.335709, -1.703467]
     """
-    system = System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t)
-    found = solve_equilibria(system, check_one("gamma", gamma))
+    system = System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t, C_s=C_s, b_s=b_s)
+    found = solve_equilibria(system, check_speed(gamma))
     return shape_of(found, root, s)
 
 
@@ -169,12 +172,15 @@ def _vacuum_line(found: Equilibria, k: int) -> Line:
 def _drag_line(found: Equilibria, k: int) -> Line:
     """Shots of an equilibrium with drag, turned so that the tow point is at (1, 0, 0)."""
     system, gamma2 = found.system, found.gamma**2
-    turned = np.exp(-1j * found.lag[k])
+    turned = (found.x_f[k] + 1j * found.y_f[k]) / found.r_f[k]
 
     def line(height: Array) -> Array:
-        _, points, codes = trace(found.r_f[k] * gamma2, found.gamma, system, height / system.lam)
-        raise_failures(codes, system, found.gamma)
-        x, y, h, fx, fy, fz, tension, _ = points.T / gamma2
+        radius = np.full(len(height), found.r_f[k] * gamma2)
+        ends = shoot(radius, found.gamma, system.row(), jets_of(0), shares=height / system.lam)
+        if (ends.status != status.OK).any():
+            raise ArithmeticError(f"{system}, gamma = {found.gamma:g}: {status.SENTENCES[int(ends.status.max())]}")
+        columns = (ends.X, ends.Y, ends.H, ends.FX, ends.FY, ends.FZ, ends.T)
+        x, y, h, fx, fy, fz, tension = (column[:, 0] / gamma2 for column in columns)
         position, force = (x + 1j * y) * turned, (fx + 1j * fy) * turned
         slope = -force.real / tension
         return np.stack([position.real, position.imag, h, force.real, force.imag, fz, tension, slope])
@@ -190,8 +196,9 @@ def _node_heights(found: Equilibria, k: int, line: Line) -> Array:
     count = SAMPLES * (nodes + 1)
     while True:
         # The waves of a hanging chain are even in the root of the tension, short next to a bare tip.
-        root = np.linspace(np.sqrt(system.w_f), np.sqrt(system.w_f + system.lam), count + 1)
-        height = np.clip(root**2 - system.w_f, 0.0, system.lam)
+        weight = abs(system.w_f)
+        root = np.linspace(np.sqrt(weight), np.sqrt(weight + system.lam), count + 1)
+        height = np.clip(root**2 - weight, 0.0, system.lam)
         x = line(height)[0]
         before = np.flatnonzero((x[1:] > 0.0) != (x[:-1] > 0.0))
         if len(before) == nodes:
