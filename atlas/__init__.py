@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from towatlas.limits import excess_length, massless_cable, threshold_length
-    from towatlas.results import CriticalStates, DragFolds, Equilibria, FishPositions
+    from towatlas.results import CriticalStates, DragFolds, Equilibria, FishPositions, Folds
     from towatlas.scene.designs import design
     from towatlas.scene.file import read_scene
     from towatlas.scene.jumps import answer_scene
     from towatlas.solve.critical import solve_critical
     from towatlas.solve.drag_folds import solve_drag_folds
     from towatlas.solve.equilibria import equilibria
+    from towatlas.solve.folds import folds
     from towatlas.solve.shapes import shape, shape_of
     from towatlas.system import System
     from towatlas.tables.atlas import Atlas, open_atlas
@@ -28,11 +29,13 @@ __all__ = [
     "DragFolds",
     "Equilibria",
     "FishPositions",
+    "Folds",
     "System",
     "answer_scene",
     "design",
     "equilibria",
     "excess_length",
+    "folds",
     "massless_cable",
     "open_atlas",
     "read_scene",
@@ -46,13 +49,14 @@ __all__ = [
 # Where each public name lives.
 _HOMES = {
     "limits": ("excess_length", "massless_cable", "threshold_length"),
-    "results": ("CriticalStates", "DragFolds", "Equilibria", "FishPositions"),
+    "results": ("CriticalStates", "DragFolds", "Equilibria", "FishPositions", "Folds"),
     "scene.designs": ("design",),
     "scene.file": ("read_scene",),
     "scene.jumps": ("answer_scene",),
     "solve.critical": ("solve_critical",),
     "solve.drag_folds": ("solve_drag_folds",),
     "solve.equilibria": ("equilibria",),
+    "solve.folds": ("folds",),
     "solve.shapes": ("shape", "shape_of"),
     "system": ("System",),
     "tables.atlas": ("Atlas", "open_atlas"),

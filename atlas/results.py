@@ -132,6 +132,56 @@ class Equilibria:
 
 
 @dataclass(frozen=True)
+class Folds:
+    """Folds of one cable as one of its numbers moves, in rising order of it: at each two shapes meet.
+
+    Attributes
+    ----------
+    system : System
+        The cable, its fish and the medium, where what moves is lowest.
+    moved : str
+        Name of what moves: "gamma", or a number of the system.
+    value : ndarray, shape (folds,)
+        Of what moves [-].
+    gamma : ndarray, shape (folds,)
+        Speed Omega sqrt(R/g) [-], negative in a turn to port.
+    r_f : ndarray, shape (folds,)
+        Distance of the fish from the axis over tow radius [-], > 0.
+    shapes_below, shapes_above : ndarray of int, shape (folds,)
+        Number of shapes just below and just above it [-], >= 1, two apart.
+    n : ndarray of int, shape (folds,)
+        Number of the fold of the vacuum from which it is continued [-], >= 1; 0 for one that drag makes.
+    origin : ndarray of str, shape (folds,)
+        "vacuum" or "drag".
+    error : ndarray, shape (folds,)
+        Estimated relative error of `value` [-], > 0.
+    status : ndarray of int8, shape (folds,)
+        Codes of `towatlas.kernels.status`.
+    complete : bool
+        Whether everything that was looked at was made out.
+    searched : str
+        What was looked at, in words.
+    """
+
+    system: System
+    moved: str
+    value: Array
+    gamma: Array
+    r_f: Array
+    shapes_below: Integers
+    shapes_above: Integers
+    n: Integers
+    origin: NDArray[np.str_]
+    error: Array
+    status: NDArray[np.int8]
+    complete: bool
+    searched: str
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+
+@dataclass(frozen=True)
 class FishPositions:
     """Where the fish is on one branch of the equilibria in a vacuum; arrays of one shape, that of what was asked.
 
