@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from towatlas.effort import TooMuchWork, patience
     from towatlas.limits import excess_length, massless_cable, threshold_length
     from towatlas.results import CriticalStates, DragFolds, Equilibria, FishPositions
     from towatlas.scene.designs import design
@@ -29,12 +30,14 @@ __all__ = [
     "Equilibria",
     "FishPositions",
     "System",
+    "TooMuchWork",
     "answer_scene",
     "design",
     "equilibria",
     "excess_length",
     "massless_cable",
     "open_atlas",
+    "patience",
     "read_scene",
     "shape",
     "shape_of",
@@ -45,6 +48,7 @@ __all__ = [
 
 # Where each public name lives.
 _HOMES = {
+    "effort": ("TooMuchWork", "patience"),
     "limits": ("excess_length", "massless_cable", "threshold_length"),
     "results": ("CriticalStates", "DragFolds", "Equilibria", "FishPositions"),
     "scene.designs": ("design",),
