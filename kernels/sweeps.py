@@ -27,13 +27,14 @@ def _march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts
         march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts, statuses, begin, stop)
 
 
-def _solve_folds(lam, w_f, n, excess, a, gamma, slopes, states, error, statuses):
+def _solve_folds(lam, w_f, n, excess, a, gamma, slopes, states, error, statuses, max_steps):
     rows = len(n)
     for block in numba.prange((rows + FOLDS_BLOCK - 1) // FOLDS_BLOCK):
         begin = block * FOLDS_BLOCK
         stop = min(rows, begin + FOLDS_BLOCK)
         # numba takes no tuples into a parallel loop: they are made inside.
-        solve_folds(Cables(lam, w_f, n, excess), Folds(a, gamma, slopes, states, error, statuses), begin, stop)
+        cables, folds = Cables(lam, w_f, n, excess), Folds(a, gamma, slopes, states, error, statuses)
+        solve_folds(cables, folds, max_steps, begin, stop)
 
 
 def _forward_shots(lam, w_f, gamma, r_x0, segments, errors, x_end, r_x_end):
