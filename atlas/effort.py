@@ -98,7 +98,7 @@ def patience(seconds: float = SECONDS) -> Iterator[None]:
     >>> import towatlas
     >>> with towatlas.patience(300):
     ...     len(towatlas.equilibria(1000.0, 1.0, 1.0))
-    45
+    39
     """
     if isinstance(seconds, bool) or not isinstance(seconds, (int, float)) or not seconds > 0:
         raise ValueError(f"seconds must be a positive number, of CPU time, or inf for no limit; got {seconds!r}")
@@ -178,7 +178,7 @@ def check_foreseen(seconds: float, what: str, remedy: str) -> None:
     # An estimate of nan, of what overflows, foresees nothing. What is used up already, the next check says.
     if budget is not None and seconds > budget.seconds - budget.used > 0.0:
         takes = f"{float(f'{seconds:.1g}'):g}" if seconds < 1e6 else "a million"
-        raise TooMuchWork(f"{what}, too much for {budget.seconds:g} s of CPU: {takes} s or more; {_go_on(remedy)}")
+        raise TooMuchWork(f"{what}, too many for {budget.seconds:g} s of CPU: {takes} s or more; {_go_on(remedy)}")
 
 
 def listen(listener: Callable[[Progress | None], object]) -> None:

@@ -219,7 +219,7 @@ def _highest(system: System, gamma: float) -> int:
     nodes = min(possible, half_waves)
     if half_waves < np.inf:
         seconds = SECONDS_A_HALF_WAVE * half_waves * (1.0 + 2.0 * nodes)
-        shapes = f"shapes of up to {nodes:,.0f} nodes on shots of {half_waves:,.0f} half waves"
+        shapes = f"shots of {np.rint(half_waves):,.12g} half waves to shapes of up to {np.rint(nodes):,.12g} nodes"
         check_foreseen(seconds, shapes, REMEDY)
     cable = (np.array([value]) for value in (lam, w_f, gamma))
     highest, codes = extrema(**dict(zip(CABLE, cable, strict=True)), shoot=shoot_singly)

@@ -104,7 +104,8 @@ def guess_passed(*, lam: Array, w_f: Array, gamma: Array) -> Integers:
         longest = lam - 1.0 - threshold_offset(w_f)
         half = slope * start + 1.0
         missing = longest - start * start
-        k = missing / (half + np.sqrt(half * half + slope * slope * missing))
+        # Without the squares, which overflow; where the first speed is above gamma, k is negative or nan.
+        k = missing / (half + np.hypot(half, slope * np.sqrt(missing)))
         return np.nan_to_num(np.clip(np.floor(k) + 1.0, 0.0, MOST)).astype(np.int64)
 
 
