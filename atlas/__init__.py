@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from towatlas.effort import TooMuchWork, patience
     from towatlas.limits import excess_length, massless_cable, threshold_length
     from towatlas.results import CriticalStates, DragFolds, Equilibria, FishPositions, Folds
     from towatlas.scene.designs import design
@@ -31,6 +32,7 @@ __all__ = [
     "FishPositions",
     "Folds",
     "System",
+    "TooMuchWork",
     "answer_scene",
     "design",
     "equilibria",
@@ -38,6 +40,7 @@ __all__ = [
     "folds",
     "massless_cable",
     "open_atlas",
+    "patience",
     "read_scene",
     "shape",
     "shape_of",
@@ -48,6 +51,7 @@ __all__ = [
 
 # Where each public name lives.
 _HOMES = {
+    "effort": ("TooMuchWork", "patience"),
     "limits": ("excess_length", "massless_cable", "threshold_length"),
     "results": ("CriticalStates", "DragFolds", "Equilibria", "FishPositions", "Folds"),
     "scene.designs": ("design",),

@@ -8,8 +8,22 @@ from numpy.typing import NDArray
 OUTSIDE_CHOICES = ("raise", "nan", "solve")
 
 
-def _short(value: Any) -> str:
-    text = repr(value)
+def short(value: Any) -> str:
+    """A value for a message.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    str
+        At most 60 characters.
+    """
+    try:
+        text = repr(value)
+    except ValueError:  # of a whole number of thousands of digits
+        return "a number too long to write"
     return text if len(text) <= 60 else text[:57] + "..."
 
 
@@ -44,7 +58,7 @@ def check_real(name: str, value: Any) -> NDArray[np.float64]:
         raise ValueError(f"{name} must be a number or an array of numbers: {error}") from None
     if array.dtype.kind not in "iuf":
         raise ValueError(
-            f"{name} must be a real number or an array of them, got {_short(value)} ({array.dtype}); convert it first"
+            f"{name} must be a real number or an array of them, got {short(value)} ({array.dtype}); convert it first"
         )
     return array.astype(np.float64)
 
@@ -118,7 +132,7 @@ def check_choice(name: str, choice: Any, choices: tuple[str, ...]) -> str:
         For any other.
     """
     if not isinstance(choice, str) or choice not in choices:
-        raise ValueError(f"{name} must be one of {', '.join(choices)}; got {_short(choice)}")
+        raise ValueError(f"{name} must be one of {', '.join(choices)}; got {short(choice)}")
     return choice
 
 
@@ -271,5 +285,5 @@ def check_root(root: Any, branch: NDArray[np.str_], expected: int, median: int =
             return row
     raise ValueError(
         f"root must be expected{', median' if median >= 0 else ''}, one of the branches {', '.join(branch)}, or a "
-        f"whole number from 0 to {len(branch) - 1}, the equilibria in rising order of R_x0; got {_short(root)}"
+        f"whole number from 0 to {len(branch) - 1}, the equilibria in rising order of R_x0; got {short(root)}"
     )

@@ -5,11 +5,14 @@ or written, is damaged, or holds something else.
 """
 
 import argparse
+import math
 import sys
+from contextlib import nullcontext
 
 from towatlas import __version__
 from towatlas.commands import build, critical, design, equilibria, fish, info, plot, report, scene, shape
-from towatlas.commands.common import FAILED, FILE, OK, USAGE, announce_compilation, say
+from towatlas.commands.common import FAILED, FILE, OK, USAGE, announce_compilation, say, shown_progress
+from towatlas.effort import patience
 from towatlas.tables.seal import AtlasFileError
 
 # In the order in which help lists them.
@@ -35,8 +38,11 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     options = _parser().parse_args(arguments)
     announce_compilation()
+    # Commands without that option look up, or take their time and show it themselves.
+    limited = "patience" in options
     try:
-        return options.run(options)
+        with shown_progress() if limited else nullcontext(), patience(options.patience if limited else math.inf):
+            return options.run(options)
     except AtlasFileError as error:
         say(str(error))
         return FILE

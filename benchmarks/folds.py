@@ -73,7 +73,7 @@ def _one_by_one(exact: FoldReference) -> Row:
         guess = np.zeros(rows), np.zeros(rows), np.full((rows, 4), np.nan)
         folds = Folds(*guess, np.empty((rows, 4)), np.empty(rows), np.empty(rows, np.int64))
         for i in range(rows):
-            solve_folds(cables, folds, i, i + 1)
+            solve_folds(cables, folds, 10**7, i, i + 1)
         gamma[:] = folds.states[:, 0]
 
     spent = seconds(solve, 3)

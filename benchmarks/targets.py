@@ -101,7 +101,9 @@ def of_threads(rows: int = 20_000) -> list[Target]:
     calls = {
         "fish-up shots": lambda: march_parallel(a, mu, tau, *orders, 10**7, ends, folds, *codes),
         "forward shots": lambda: forward_shots_parallel(lam, ones, ones, -lam, 100, *out),
-        "folds": lambda: solve_folds_parallel(lam, w_f, n, excess, *(column.copy() for column in guess), *folded),
+        "folds": lambda: solve_folds_parallel(
+            lam, w_f, n, excess, *(column.copy() for column in guess), *folded, 10**7
+        ),
         "folds with their seeds": lambda: towatlas.solve_critical(lam, w_f, n),
     }
     found, before = [], numba.get_num_threads()

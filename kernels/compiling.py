@@ -153,16 +153,21 @@ class _Listener(event.Listener):
 
     def __init__(self) -> None:
         self.depth = 0
+        self.ours = False
 
     def on_start(self, event: event.Event) -> None:
         function = event.data["dispatcher"].py_func
         # numba compiles under a lock of its own: one thread at a time counts here.
         if self.depth == 0 and (function.__module__ or "").startswith(__name__.rpartition(".")[0]):
+            self.ours = True
             notice.compiling(function.__name__)
         self.depth += 1
 
     def on_end(self, event: event.Event) -> None:
         self.depth -= 1
+        if self.depth == 0 and self.ours:
+            self.ours = False
+            notice.compiled()
 
 
 event.register("numba:compile", _Listener())

@@ -16,7 +16,6 @@ EPS = 2.0**-52
 DIFFERENCE = 1e-6
 ROUNDS = 60
 RETREATS = 20
-MAX_STEPS = 10**7
 # Broyden's updates take over from Newton below this step; above, the Jacobian changes too fast.
 NEAR = 0.05
 # The error estimate in units of rounding, of 1 and of lambda over the excess length. Measured: below 6 against 34
@@ -254,11 +253,12 @@ def _settle(n, job_a, job_mu, fold, state):
 
 
 @kernel
-def solve_folds(cables, folds, begin, stop):
+def solve_folds(cables, folds, max_steps, begin, stop):
     """Critical states of the cables given, for rows begin..stop-1.
 
     Unknowns log a and log gamma, so that both limits of every power law are straight lines; Newton with differences
-    while far, Broyden when near. All rows not yet done make their shots together, round after round.
+    while far, Broyden when near. All rows not yet done make their shots together, round after round, each of at most
+    max_steps steps.
     """
     # Arrays one by one from here on: a tuple of them costs a microsecond a row to hand around.
     lam, w_f, n, excess = cables.lam, cables.w_f, cables.n, cables.excess
@@ -288,7 +288,7 @@ def solve_folds(cables, folds, begin, stop):
                 jobs = _place_shots(w_f[begin + k], n[begin + k], work, book, k, jobs, job_a, job_mu, job_n)
         if jobs == 0:
             break
-        march(job_a, job_mu, job_end, job_n, job_n, MAX_STEPS, ends, shot_folds, counts, outcomes, 0, jobs)
+        march(job_a, job_mu, job_end, job_n, job_n, max_steps, ends, shot_folds, counts, outcomes, 0, jobs)
         for k in range(rows):
             if not book[k, OPEN]:
                 continue

@@ -18,7 +18,7 @@ from towatlas.kernels.scan import forward_shots, scan_system
 SHOTS_BLOCK = 256
 FOLDS_BLOCK = 128
 FORWARD_BLOCK = 1024
-# Shots with drag between two looks at the clock: at their longest, seconds.
+# Shots with drag that a thread takes at a time.
 DRAG_BLOCK = 128
 
 
@@ -30,13 +30,14 @@ def _march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts
         march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts, statuses, begin, stop)
 
 
-def _solve_folds(lam, w_f, n, excess, a, gamma, slopes, states, error, statuses):
+def _solve_folds(lam, w_f, n, excess, a, gamma, slopes, states, error, statuses, max_steps):
     rows = len(n)
     for block in numba.prange((rows + FOLDS_BLOCK - 1) // FOLDS_BLOCK):
         begin = block * FOLDS_BLOCK
         stop = min(rows, begin + FOLDS_BLOCK)
         # numba takes no tuples into a parallel loop: they are made inside.
-        solve_folds(Cables(lam, w_f, n, excess), Folds(a, gamma, slopes, states, error, statuses), begin, stop)
+        cables, folds = Cables(lam, w_f, n, excess), Folds(a, gamma, slopes, states, error, statuses)
+        solve_folds(cables, folds, max_steps, begin, stop)
 
 
 def _forward_shots(lam, w_f, gamma, r_x0, segments, errors, x_end, r_x_end):
@@ -64,18 +65,17 @@ def _scan_systems(lam, w_f, gamma_low, gamma_high, speeds, guesses, segments, n_
         )
 
 
-def shoot_drag_threads(shots: Shots, algebra: Algebra, max_steps: int, reached: Reached) -> None:
+def shoot_drag_threads(shots: Shots, algebra: Algebra, max_steps: int, reached: Reached, begin: int, stop: int) -> None:
     """`shoot_drag` over blocks of rows, on as many threads as numba is allowed."""
-    rows = len(shots.r)
-    begins = range(0, rows, DRAG_BLOCK)
+    begins = range(begin, stop, DRAG_BLOCK)
     threads = min(len(begins), numba.get_num_threads())
 
-    def shoot(begin: int) -> None:
-        shoot_drag(shots, algebra, max_steps, reached, begin, min(rows, begin + DRAG_BLOCK))
+    def shoot(first: int) -> None:
+        shoot_drag(shots, algebra, max_steps, reached, first, min(stop, first + DRAG_BLOCK))
 
     if threads < 2:
-        for begin in begins:
-            shoot(begin)
+        for first in begins:
+            shoot(first)
         return
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(shoot, begins))

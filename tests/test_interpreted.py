@@ -59,9 +59,9 @@ def folds_of(lam, w_f, n, parallel=False):
     cables = Cables(lam, w_f, n, excess_length(lam, w_f, n))
     folds = Folds(a, gamma, slopes, np.empty((rows, 4)), np.empty(rows), np.empty(rows, np.int64))
     if parallel:
-        solve_folds_parallel(*cables, *folds)
+        solve_folds_parallel(*cables, *folds, 10**7)
     else:
-        solve_folds(cables, folds, 0, rows)
+        solve_folds(cables, folds, 10**7, 0, rows)
     assert set(folds.statuses) == {status.OK}
     return np.column_stack([folds.states, folds.error])
 

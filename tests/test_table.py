@@ -17,7 +17,8 @@ import towatlas
 from towatlas.builders.fish import build_equilibria
 from towatlas.builders.grids import EquilibriaGrid
 from towatlas.kernels import status
-from towatlas.solve.equilibria import folds_passed, solve_branch
+from towatlas.solve.equilibria import solve_branch
+from towatlas.solve.passed import folds_passed
 from towatlas.tables.seal import AtlasFileError, read_sealed
 
 

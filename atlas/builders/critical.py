@@ -1,5 +1,6 @@
 """Building an atlas of critical states: the grids, the sweeps over them, and what goes into the file."""
 
+import math
 import os
 import time
 from collections.abc import Mapping
@@ -16,6 +17,7 @@ from towatlas.builders.grids import WHOLE_SCAN, Grid, ScanSettings
 from towatlas.builders.scan import Facts, scan_table, witness
 from towatlas.cf import WITNESS, plain_table, root_attributes, symbol_attributes
 from towatlas.checks import check_choice
+from towatlas.effort import patience
 from towatlas.kernels import status
 from towatlas.limits import W_SCALE, unchecked_excess_length, unchecked_threshold_length
 from towatlas.numerics import chebyshev
@@ -82,7 +84,7 @@ def build_atlas(
     scan = scan or (ScanSettings() if method == METHOD else WHOLE_SCAN)
     total = scan.size + (grid.size if method == METHOD else 0)
     groups: dict[str, xr.Dataset] = dict(extra or {})
-    with limited_threads(threads), progress_bar(total, "fold", progress) as bar:
+    with patience(math.inf), limited_threads(threads), progress_bar(total, "fold", progress) as bar:
         if method == METHOD:
             root, parts, facts = _build_fold(grid, scan, bar)
             groups = parts | groups

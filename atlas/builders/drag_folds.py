@@ -1,5 +1,6 @@
 """Building the group of folds with drag of an atlas: plain tables, the series for lookup, and their errors."""
 
+import math
 import os
 import time
 from dataclasses import replace
@@ -15,6 +16,7 @@ from towatlas.builders.drag_series import Series, fit_series, measure_errors
 from towatlas.builders.file import Summary, limited_threads, progress_bar
 from towatlas.builders.grids import DragGrid, Grid, ScanSettings
 from towatlas.cf import symbol_attributes
+from towatlas.effort import patience
 from towatlas.nomenclature import DRAG
 from towatlas.numerics.chebyshev import at_points
 from towatlas.numerics.errormap import SAFETY
@@ -44,7 +46,7 @@ def drag_group(grid: DragGrid, threads: int | None = None, progress: bool = True
     ArithmeticError
         If a curve on the grid has no cusp: the series would cross its disappearance.
     """
-    with limited_threads(threads), progress_bar(grid.size, "cable", progress) as bar:
+    with patience(math.inf), limited_threads(threads), progress_bar(grid.size, "cable", progress) as bar:
         bar.set_description("drag")
         series, errors = [], []
         for n in range(1, grid.n_max + 1):

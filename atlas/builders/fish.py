@@ -1,5 +1,6 @@
 """Building the table of equilibria: the median branch and the outward one over (w_f, lambda, gamma)."""
 
+import math
 import os
 import time
 from pathlib import Path
@@ -13,6 +14,7 @@ from tqdm import tqdm
 from towatlas.builders.file import Summary, limited_threads, progress_bar, provenance, write_atlas
 from towatlas.builders.grids import EquilibriaGrid
 from towatlas.cf import equilibria_attributes, equilibrium_variable, variable
+from towatlas.effort import patience
 from towatlas.kernels import status
 from towatlas.limits import W_SCALE, unchecked_excess_length
 from towatlas.numerics.errormap import SAFETY, stated_error
@@ -66,7 +68,7 @@ def build_equilibria(
     grid = grid or EquilibriaGrid()
     between = _between(grid)
     total = grid.size + between.size
-    with limited_threads(threads), progress_bar(total, "cable", progress) as bar:
+    with patience(math.inf), limited_threads(threads), progress_bar(total, "cable", progress) as bar:
         critical, solved = _solve(grid, bar, "equilibria")
         critical_between, exact = _solve(between, bar, "checking")
         sheets = _one_sheet(grid, critical["gamma"], critical_between["gamma"])

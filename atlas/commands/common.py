@@ -5,9 +5,13 @@ import json
 import math
 import os
 import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from towatlas import effort
 from towatlas.kernels import notice
 from towatlas.nomenclature import EQUILIBRIUM
 from towatlas.tables.file import default_path
@@ -79,6 +83,17 @@ def order(text: str) -> int:
     return value
 
 
+def seconds(text: str) -> float:
+    """Patience: infinite, too."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not value > 0.0:
+        raise argparse.ArgumentTypeError(f"{text} s are no time")
+    return value
+
+
 def threads(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of threads")
@@ -129,6 +144,17 @@ def real(value: Any) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
+def add_patience(parser: argparse.ArgumentParser) -> None:
+    """How long it may take; `towatlas.cli` runs the command with it."""
+    parser.add_argument(
+        "--patience",
+        type=seconds,
+        default=effort.SECONDS,
+        metavar="SECONDS",
+        help="give up after so much CPU time, default %(default)g; inf for never",
+    )
+
+
 def add_atlas(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--atlas",
@@ -171,3 +197,46 @@ def announce_compilation() -> None:
         said.append(kernel)
 
     notice.listen(announce)
+
+
+# A bar appears for who has waited so long, and is drawn anew so often, s.
+BAR_DELAY, BAR_EVERY = 2.0, 0.2
+
+
+@contextmanager
+def shown_progress() -> Iterator[None]:
+    """Long loops drawn as a bar on a terminal: what is done, and how much of the patience is used."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    bars: list[Any] = []
+    drawn = time.monotonic() + BAR_DELAY
+
+    def draw(progress: effort.Progress | None) -> None:
+        nonlocal drawn
+        if progress is None:
+            # An answer follows, on a line of its own.
+            while bars:
+                bars.pop().close()
+        # Loops within, which do not know how far they have come, leave standing what the outer one said.
+        elif time.monotonic() > drawn + BAR_EVERY and (progress.known or not bars):
+            drawn = time.monotonic()
+            if not bars:
+                bars.append(_bar(progress.seconds))
+            bars[0].n = progress.used
+            bars[0].set_description(progress.words)
+
+    effort.listen(draw)
+    try:
+        yield
+    finally:
+        draw(None)
+        effort.listen(repr)
+
+
+def _bar(total: float) -> Any:
+    from tqdm import tqdm
+
+    if math.isinf(total):
+        return tqdm(leave=False, bar_format="{desc}{n:.0f} s of CPU")
+    return tqdm(total=total, leave=False, bar_format="{desc}{n:.0f} of {total:.0f} s of CPU |{bar}|")

@@ -12,6 +12,7 @@ from towatlas.commands.common import (
     OUTSIDE,
     add_atlas,
     add_cable,
+    add_patience,
     drag,
     order,
     print_json,
@@ -54,6 +55,7 @@ def add(commands: Any) -> None:
         "--solve", action="store_true", help="solve directly instead of looking up: any n, any length, no atlas needed"
     )
     parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
+    add_patience(parser)
     parser.set_defaults(run=_run)
 
 
@@ -67,7 +69,8 @@ def _run(options: argparse.Namespace) -> int:
     orders = np.arange(1, min(existing, limit) + 1) if options.n is None else np.array([options.n])
     if options.n is None and existing > limit:
         remedy = "name one with --n" if options.solve else "the atlas ends there, --solve --n N solves any"
-        say(f"lambda = {lam:g} has {existing} transitions; the first {limit} follow ({remedy})")
+        number = existing if existing < 1e15 else float(existing)
+        say(f"lambda = {lam:g} has {number} transitions; the first {limit} follow ({remedy})")
     states = solve_critical(lam, w_f, orders) if atlas is None else atlas.states(lam, w_f, orders, outside="nan")
     rows = _rows(states)
     print_json(rows) if options.json else print(_as_table(rows), end="")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from towatlas.commands.common import NO_STATE, OK, add_atlas, print_json, say
+from towatlas.commands.common import NO_STATE, OK, add_atlas, add_patience, print_json, say
 from towatlas.commands.scene import add_speed, atlas_if_any, describe_speed, quantity, scene_of
 from towatlas.scene.choice import Choice
 from towatlas.scene.designs import Design, design
@@ -40,6 +40,7 @@ def add(commands: Any) -> None:
     add_speed(parser)
     add_atlas(parser)
     parser.add_argument("--json", action="store_true", help="one object instead of a table")
+    add_patience(parser)
     parser.set_defaults(run=_run)
 
 

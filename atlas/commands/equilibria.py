@@ -3,7 +3,7 @@
 import argparse
 from typing import Any
 
-from towatlas.commands.common import OK, add_cable, add_fluid, fluid, print_json, real, say
+from towatlas.commands.common import OK, add_cable, add_fluid, add_patience, fluid, print_json, real, say
 from towatlas.results import Equilibria
 from towatlas.solve.equilibria import equilibria
 
@@ -22,6 +22,7 @@ def add(commands: Any) -> None:
     add_cable(parser, any_medium=True)
     add_fluid(parser)
     parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
+    add_patience(parser)
     parser.set_defaults(run=_run)
 
 

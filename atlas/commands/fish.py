@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from towatlas.commands.common import FAILED, NO_STATE, OK, OUTSIDE, add_cable, print_json, say
+from towatlas.commands.common import FAILED, NO_STATE, OK, OUTSIDE, add_cable, add_patience, print_json, say
 from towatlas.kernels import status
 from towatlas.tables.atlas import open_atlas
 from towatlas.tables.file import EQUILIBRIA_PATH
@@ -24,6 +24,7 @@ def add(commands: Any) -> None:
     parser.add_argument("--table", type=Path, default=EQUILIBRIA_PATH, metavar="FILE", help="default %(default)s")
     parser.add_argument("--solve", action="store_true", help="solve directly what lies outside the table")
     parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
+    add_patience(parser)
     parser.set_defaults(run=_run)
 
 

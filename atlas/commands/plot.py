@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from towatlas.commands.common import FIGURE_FORMATS, OK, add_atlas, new_figure, save_figure
+from towatlas.commands.common import FIGURE_FORMATS, OK, add_atlas, add_patience, new_figure, save_figure
 from towatlas.tables.atlas import open_atlas
 
 
@@ -20,6 +20,7 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="FILE.svg, .png or .pdf")
     add_atlas(parser)
+    add_patience(parser)
     parser.set_defaults(run=_run)
 
 

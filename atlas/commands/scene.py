@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from towatlas.commands.common import OK, add_atlas, print_json, real, say
+from towatlas.commands.common import OK, add_atlas, add_patience, print_json, real, say
 from towatlas.commands.common import speed as dimensionless_speed
 from towatlas.kernels import status
 from towatlas.scene.choice import Choice, percent
@@ -49,6 +49,7 @@ def add(commands: Any) -> None:
     )
     add_atlas(parser)
     parser.add_argument("--json", action="store_true", help="one object instead of tables")
+    add_patience(parser)
     parser.set_defaults(run=_run)
 
 

@@ -12,6 +12,7 @@ from towatlas.commands.common import (
     OK,
     add_cable,
     add_fluid,
+    add_patience,
     fluid,
     new_figure,
     number,
@@ -22,6 +23,7 @@ from towatlas.kernels.system import COLUMNS as SYSTEM
 from towatlas.solve.shapes import POINTS, shape
 
 FORMATS = (".nc", ".csv", *FIGURE_FORMATS)
+MOST_POINTS = 10**6
 COLUMNS = ("s", "x", "y", "z", "R_x", "R_y", "R_z", "T")
 
 
@@ -46,14 +48,15 @@ def add(commands: Any) -> None:
     where.add_argument("--points", type=int, default=POINTS, metavar="N", help="evenly spaced, default %(default)s")
     where.add_argument("--s", type=number, nargs="+", metavar="S", help="arc lengths from the tow point [tow radii]")
     parser.add_argument("--out", type=Path, metavar="FILE", help="FILE.nc, .csv, .svg, .png or .pdf")
+    add_patience(parser)
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
     if options.out and options.out.suffix.lower() not in FORMATS:
         raise ValueError(f"--out {options.out}: the ending must be one of {', '.join(FORMATS)}")
-    if options.points < 2:
-        raise ValueError(f"--points {options.points}: a shape has two points or more")
+    if not 2 <= options.points <= MOST_POINTS:
+        raise ValueError(f"--points {options.points}: a shape has 2 points or more, up to {MOST_POINTS:,}")
     root = int(options.root) if options.root.isdecimal() else options.root
     arc = options.s if options.s else np.linspace(0.0, options.lam, options.points)
     curve = shape(options.lam, options.wf, options.gamma, root=root, s=arc, **fluid(options))

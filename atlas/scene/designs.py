@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.checks import check_one
+from towatlas.effort import patience
 from towatlas.scene.choice import Choice, least_model
 from towatlas.scene.jumps import Jumps, critical_speeds
-from towatlas.scene.scene import Scene
+from towatlas.scene.scene import Scene, patient_with
 from towatlas.solve.depths import CablesToDepth, cables_to_depth
 from towatlas.tables.atlas import Atlas
 
@@ -72,12 +73,14 @@ class Design:
         ValueError, ArithmeticError
             As `towatlas.scene.choice.least_model`.
         """
-        return {
-            int(k): least_model(
-                replace(self.scene, length=float(self.cables.lam[k]) * self.scene.radius), model, DESIGN_QUESTIONS
-            )
-            for k in np.flatnonzero(self.chosen & self.expected)
-        }
+        found = {}
+        with patience():
+            for k in np.flatnonzero(self.chosen & self.expected):
+                length = float(self.cables.lam[k]) * self.scene.radius
+                cable = replace(self.scene, length=length, given=self.scene.given | {"cable.length": f"{length:g} m"})
+                with patient_with(cable):
+                    found[int(k)] = least_model(cable, model, DESIGN_QUESTIONS)
+        return found
 
 
 def design(
@@ -112,7 +115,7 @@ def design(
     ValueError
         For numbers out of range.
     ArithmeticError
-        If the computation overflows or does not converge.
+        If the computation overflows, does not converge, or takes longer than `towatlas.patience` allows (TooMuchWork).
 
     Examples
     --------
@@ -128,7 +131,9 @@ def design(
     given = LONGEST * float(np.hypot(depth, scene.radius)) if max_length is None else max_length
     longest = check_one("length", given)
     w_f, gamma = scene.system("vacuum").w_f, scene.gamma
-    cables = cables_to_depth(w_f=w_f, gamma=gamma, z_f=depth / scene.radius, lam_max=longest / scene.radius)
+    with patient_with(scene, f"--depth {depth:g} m, --max-length {longest:g} m", longest / scene.radius):
+        cables = cables_to_depth(w_f=w_f, gamma=gamma, z_f=depth / scene.radius, lam_max=longest / scene.radius)
+        jumps = [critical_speeds(lam=float(lam), w_f=w_f, gamma=gamma, atlas=atlas) for lam in cables.lam]
     return Design(
         scene=scene,
         depth=depth,
@@ -136,5 +141,5 @@ def design(
         longest=longest,
         cables=cables,
         chosen=np.abs(cables.x_f) * scene.radius <= max_radius,
-        jumps=[critical_speeds(lam=float(lam), w_f=w_f, gamma=gamma, atlas=atlas) for lam in cables.lam],
+        jumps=jumps,
     )

@@ -9,11 +9,14 @@ from math import pi, sqrt
 from pathlib import Path
 from typing import Any
 
-from towatlas.scene.scene import Scene
+from towatlas.checks import short
+from towatlas.scene.scene import SPEED_KEYS, Scene
 from towatlas.scene.units import parse_quantity
 
 STANDARD_GRAVITY = 9.80665
 TEXT = "text"
+# A scene is a page: what is longer is something else.
+LARGEST = 10**6  # bytes
 # Density of the fluids that have a name, kg/m^3: air at 15 degrees C and water, both at one atmosphere.
 FLUIDS = {"vacuum": 0.0, "air": 1.225, "water": 1000.0, "seawater": 1025.0}
 
@@ -99,17 +102,27 @@ def read_scene(path: str | os.PathLike) -> Scene:
     if not file.is_file() and os.fspath(path) in shipped_scenes():
         file = resources.files("towatlas.scene") / "scenes" / f"{os.fspath(path)}.toml"
     try:
-        table = tomllib.loads(file.read_text("utf-8-sig"))
+        with file.open("rb") as stream:
+            content = stream.read(LARGEST + 1)
+        if len(content) > LARGEST:
+            raise SceneFileError(f"{path} is no scene: it has more than {LARGEST:,} bytes")
+        # Lines as a file in text mode has them.
+        table = tomllib.loads(content.decode("utf-8-sig").replace("\r\n", "\n"))
     except FileNotFoundError:
         raise SceneFileError(
             f"no scene at {path}; scenes that come with the package: {', '.join(shipped_scenes())}"
         ) from None
+    except SceneFileError:
+        raise
     except OSError as error:
         raise SceneFileError(f"{path} cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
         raise SceneFileError(f"{path} is not a text file in UTF-8") from None
     except tomllib.TOMLDecodeError as error:
         raise SceneFileError(f"{path} is not valid TOML: {error}") from None
+    except (ValueError, RecursionError):
+        # What Python's reader of TOML does not refuse itself: whole numbers of thousands of digits, deep nesting.
+        raise SceneFileError(f"{path} is no scene: a number is too long, or tables are nested too deep") from None
     try:
         return make_scene(table, os.fspath(path))
     except ValueError as error:
@@ -162,12 +175,25 @@ def make_scene(table: dict[str, Any], source: str = "") -> Scene:
         density=density,
         gravity=gravity,
         tolerance=values.get("tolerance", 0.01),
+        given=_given(table),
     )
     if scene.medium == "water" and scene.fish_displaced != scene.fish_displaced:
         raise ValueError(
             "fish.volume or fish.submerged_weight is missing: in a fluid as dense as this the fish needs its buoyancy"
         )
     return scene
+
+
+def _given(table: dict[str, Any]) -> dict[str, str]:
+    """Length, radius and speed as they are written, a number without a unit with the one it is taken for."""
+    texts = {}
+    for name in ("cable.length", "tow.radius", *SPEED_KEYS):
+        section, key = name.split(".")
+        if key in table.get(section, {}):
+            value = table[section][key]
+            unit = "rpm" if key == "rpm" else _KEYS[section][key]
+            texts[name] = value if isinstance(value, str) else f"{float(value):g} {unit}".strip()
+    return texts
 
 
 def _parse(table: dict[str, Any]) -> dict[str, Any]:
@@ -180,7 +206,7 @@ def _parse(table: dict[str, Any]) -> dict[str, Any]:
             for key, inner in value.items():
                 flat[f"{name}.{key}"] = inner
         elif name in _KEYS:
-            raise ValueError(f"{name} = {value!r} is a section; write [{name}] and its keys below")
+            raise ValueError(f"{name} = {short(value)} is a section; write [{name}] and its keys below")
         else:
             flat[name] = value
     return {name: _value(name, value) for name, value in flat.items()}
@@ -194,11 +220,11 @@ def _value(name: str, value: Any) -> Any:
     unit = keys[key]
     if unit == TEXT:
         if not isinstance(value, str):
-            raise ValueError(f"{name} = {value!r} is not a text")
+            raise ValueError(f"{name} = {short(value)} is not a text")
         return value
     number = parse_quantity(name, value, unit, bare="rpm" if key == "rpm" else None)
     if name not in _SIGNED and (number < 0.0 or (number == 0.0 and name not in _MAY_BE_ZERO)):
-        raise ValueError(f"{name} = {value!r} is {'negative' if number < 0.0 else 'zero'}")
+        raise ValueError(f"{name} = {short(value)} is {'negative' if number < 0.0 else 'zero'}")
     return number
 
 

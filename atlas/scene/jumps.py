@@ -6,14 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from towatlas.effort import check_foreseen, check_patience
 from towatlas.kernels import status
 from towatlas.limits import transitions
 from towatlas.results import Equilibria
 from towatlas.scene.choice import Choice, least_model
 from towatlas.scene.models import QUESTIONS
 from towatlas.scene.pairs import PairSpeeds
-from towatlas.scene.scene import Scene
-from towatlas.solve.critical import solve_critical
+from towatlas.scene.scene import Scene, patient_with
+from towatlas.solve.critical import SECONDS_A_HALF_WAVE, solve_critical
+from towatlas.solve.members import REMEDY
+from towatlas.solve.passed import guess_passed
 from towatlas.tables.atlas import Atlas
 from towatlas.tables.critical import CriticalTable
 
@@ -136,9 +139,14 @@ def critical_speeds(*, lam: float, w_f: float, gamma: float, atlas: Atlas | None
     Jumps
     """
     existing = transitions(lam=lam, w_f=w_f)
+    cable = {"lam": np.array([lam]), "w_f": np.array([w_f])}
+    listed = min(existing, int(guess_passed(**cable, gamma=np.array([gamma * (1.0 + NEAR)]))[0]))
+    # Each is solved by itself, on shots of as many half waves as its number.
+    check_foreseen(0.5 * SECONDS_A_HALF_WAVE * listed**2, f"{listed:,} critical speeds below the speed", REMEDY)
     parts: list[dict[str, NDArray]] = []
     first = 1
     while first <= existing:
+        check_patience("critical speeds below the speed", REMEDY, done=first - 1, of=max(listed, first - 1))
         n = np.arange(first, min(first + BLOCK, existing + 1))
         parts.append(_block(n, lam=lam, w_f=w_f, atlas=atlas))
         highest = parts[-1]["gamma"][-1]
@@ -194,7 +202,7 @@ def answer_scene(
     ValueError
         If the scene has no length, or one of the models no such cable.
     ArithmeticError
-        If the computation overflows or does not converge.
+        If the computation overflows, does not converge, or takes longer than `towatlas.patience` allows (TooMuchWork).
 
     Examples
     --------
@@ -203,9 +211,14 @@ def answer_scene(
     >>> int(answer.equilibria.nodes[answer.equilibria.expected])
     1
     """
-    groups, gamma = scene.system("vacuum"), scene.gamma
-    if not np.isfinite(groups.lam):
+    if not np.isfinite(scene.system("vacuum").lam):
         raise ValueError(f"{scene.source}: cable.length is missing; a design finds one: towatlas design --help")
+    with patient_with(scene):
+        return _answer(scene, atlas, model, asked)
+
+
+def _answer(scene: Scene, atlas: Atlas | None, model: str | None, asked: Sequence[str]) -> SceneAnswer:
+    groups, gamma = scene.system("vacuum"), scene.gamma
     jumps = critical_speeds(lam=groups.lam, w_f=groups.w_f, gamma=gamma, atlas=atlas)
     passed = jumps.passed(gamma)
     # The pairs that decide where the cable jumps, as it slows down and speeds up; one more should the second be gone.

@@ -1,15 +1,20 @@
 """A towing scene in real units, and its dimensionless groups."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from math import pi, sqrt
 from typing import Any
 
 from towatlas.checks import check_one
+from towatlas.effort import TooMuchWork, patience
 from towatlas.system import System
 
 KNOT = 1852.0 / 3600.0  # m/s
 # The models of the report's Table 1, in rising order of what they take into account.
 MODELS = ("vacuum", "air", "water")
+# Keys of a file that give the speed.
+SPEED_KEYS = ("tow.speed", "tow.rpm", "tow.rotation_rate", "tow.gamma")
 
 
 @dataclass(frozen=True)
@@ -48,6 +53,8 @@ class Scene:
         [m/s^2], > 0.
     tolerance : float
         Within which models agree, relative [-], > 0.
+    given : dict of str
+        Length, radius and speed as the user wrote them, by "section.key"; empty by default.
     """
 
     title: str
@@ -65,6 +72,7 @@ class Scene:
     density: float
     gravity: float
     tolerance: float
+    given: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def gamma(self) -> float:
@@ -216,7 +224,50 @@ class Scene:
             raise ValueError(f"give exactly one of speed, rotation_rate and gamma, not {len(checked)}")
         ((name, value),) = checked.items()
         speeds = {"speed": value, "rotation_rate": value * self.radius, "gamma": self.speed_of(value)}
-        return replace(self, speed=speeds[name])
+        texts = {key: text for key, text in self.given.items() if key not in SPEED_KEYS}
+        return replace(self, speed=speeds[name], given=texts)
+
+    def described(self, length: str | None = None, lam: float | None = None) -> str:
+        """What makes the work that a scene is, in the units of the user.
+
+        Parameters
+        ----------
+        length : str, optional
+            What stands for the length, as "--max-length = 200 m"; that of the cable by default.
+        lam : float, optional
+            That length over tow radius [-].
+
+        Returns
+        -------
+        str
+        """
+        given = self.given
+        radius = given.get("tow.radius", f"{self.radius:g} m")
+        speed = next((f"{key} = {given[key]}" for key in SPEED_KEYS if key in given), f"a speed of {self.speed:g} m/s")
+        length = length or f"cable.length = {given.get('cable.length', f'{self.length:g} m')}"
+        lam = self.length / self.radius if lam is None else lam
+        return f"{length} with tow.radius = {radius} makes lam = {lam:,.6g}, {speed} makes gamma = {self.gamma:.6g}"
+
+
+@contextmanager
+def patient_with(scene: Scene, length: str | None = None, lam: float | None = None) -> Iterator[None]:
+    """Patience with what is computed for a scene; a refusal names its keys in the units of the user.
+
+    Parameters
+    ----------
+    scene : Scene
+    length, lam : optional
+        As of `Scene.described`.
+
+    Raises
+    ------
+    TooMuchWork
+    """
+    try:
+        with patience():
+            yield
+    except TooMuchWork as error:
+        raise TooMuchWork(f"{scene.described(length, lam)}: {error}") from None
 
 
 def check_model(model: str) -> str:

@@ -6,9 +6,19 @@ import re
 from fractions import Fraction
 from typing import Any
 
+from towatlas.checks import short
+
 # Number, unit. The number may be a fraction, "11/16", or a mixed one, "1 1/2".
 _DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"\s*([+-]?)\s*(?:(\d+)\s+(\d+)/(\d+)|({_DECIMAL})(?:\s*/\s*({_DECIMAL}))?)\s*(.*?)\s*")
+# A quantity is a few words. Longer ones, and exponents beyond those of a float, would be worked out to the last digit.
+_LONGEST = 100  # characters
+_EXPONENT = 400
+# Of units: names, products, quotients, powers of one digit. What else pint understands, as 9**9**9 m, may never end.
+# Possessive, so that no text takes long to refuse.
+_NAME = r"[^\W\d]\w*+|[%°'\"]"
+_POWER = r"(?:\s*+(?:\^|\*\*)\s*+[+-]?\d(?:\.\d)?(?![\d.]))?"
+_UNIT = re.compile(rf"(?:(?:[*/·()\s]|1\s*+/|{_NAME}){_POWER})*+")
 # What a number with units may be for; the message names it. Angles are told from pure numbers, see `_same`.
 _KINDS = {
     "m": "a length",
@@ -71,13 +81,18 @@ def parse_quantity(name: str, value: Any, unit: str, bare: str | None = None) ->
     0.0174625
     """
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(f"{name} = {value!r} is not {_KINDS[unit]}; write a number in SI or a text as {_sample(unit)}")
+        raise ValueError(
+            f"{name} = {short(value)} is not {_KINDS[unit]}; write a number in SI or a text as {_sample(unit)}"
+        )
     if isinstance(value, str):
         number, symbol = _split(name, value, unit)
     else:
-        number, symbol = float(value), ""
+        try:
+            number, symbol = float(value), ""
+        except OverflowError:
+            raise ValueError(f"{name} = {short(value)} is not finite") from None
     if not math.isfinite(number):
-        raise ValueError(f"{name} = {value!r} is not finite")
+        raise ValueError(f"{name} = {short(value)} is not finite")
     if not isinstance(value, str):
         symbol = bare or unit
     if symbol == unit:
@@ -86,30 +101,46 @@ def parse_quantity(name: str, value: Any, unit: str, bare: str | None = None) ->
 
 
 def _split(name: str, text: str, unit: str) -> tuple[float, str]:
-    parts = _QUANTITY.fullmatch(text)
+    parts = _QUANTITY.fullmatch(text) if len(text) <= _LONGEST else None
     if parts is None:
-        raise ValueError(f"{name} = {text!r} is not {_KINDS[unit]}; write a number and its unit, as {_sample(unit)}")
+        raise ValueError(
+            f"{name} = {short(text)} is not {_KINDS[unit]}; write a number and its unit, as {_sample(unit)}"
+        )
     sign, whole, above, below, number, divisor, symbol = parts.groups()
     try:
         if whole is not None:
             value = Fraction(whole) + Fraction(int(above), int(below))
         else:
-            value = Fraction(number) / Fraction(divisor or 1)
+            value = _decimal(number) / _decimal(divisor or "1")
         return float(-value if sign == "-" else value), symbol
     except (ZeroDivisionError, OverflowError):
         raise ValueError(f"{name} = {text!r} is not finite") from None
+
+
+def _decimal(text: str) -> Fraction:
+    """A decimal number as it is written; zero or OverflowError for an exponent that no float has."""
+    exponent = int(text.lower().partition("e")[2] or "0")
+    if exponent > _EXPONENT:
+        raise OverflowError
+    return Fraction(text) if exponent >= -_EXPONENT else Fraction(0)
 
 
 def _convert(name: str, value: Any, number: float, symbol: str, unit: str) -> float:
     registry = _registry()
     wanted = registry.Quantity(1.0, unit)
     try:
+        if _UNIT.fullmatch(symbol) is None:
+            raise ValueError
         given = registry.Quantity(1.0, registry.Unit(symbol))
-    except Exception:  # pint raises whatever its parser meets
-        raise ValueError(f"{name} = {value!r}: unit {symbol!r} is unknown; write it as {_sample(unit)}") from None
-    if not given._is_multiplicative or not _same(given, wanted):
-        raise ValueError(f"{name} = {value!r} is not {_KINDS[unit]}{_hint(symbol, given, unit)}")
-    return float((number * given).to(wanted.units).magnitude)
+        same = _same(given, wanted)
+    except Exception:  # pint raises whatever its parser meets, and what powers of prefixes overflow
+        raise ValueError(f"{name} = {short(value)}: unit {symbol!r} is unknown; write it as {_sample(unit)}") from None
+    if not given._is_multiplicative or not same:
+        raise ValueError(f"{name} = {short(value)} is not {_KINDS[unit]}{_hint(symbol, given, unit)}")
+    converted = float((number * given).to(wanted.units).magnitude)
+    if not math.isfinite(converted):
+        raise ValueError(f"{name} = {short(value)} is not finite")
+    return converted
 
 
 def _hint(symbol: str, given: Any, unit: str) -> str:

@@ -6,15 +6,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from towatlas.checks import check_broadcast, check_order, check_positive_finite, check_real
+from towatlas.effort import check_foreseen, check_patience, patience, scaled
 from towatlas.kernels import status
 from towatlas.limits import unchecked_excess_length
 from towatlas.results import CriticalStates
+from towatlas.solve.batches import batches
 from towatlas.solve.fold_seeds import seed
+from towatlas.solve.members import FEWEST
 
 Array = NDArray[np.float64]
 
 # From here on the parallel build, whose call costs a millisecond, is the faster one.
 PARALLEL_FROM = 256
+# Steps of one shot: with the default patience, some ten of which a fold takes, a few seconds together; at most.
+STEPS, MOST_STEPS = 4 * 10**5, 10**7
+# Half waves up to the folds of one call, each about 5 microseconds where there are many folds, up to ten times as much
+# next to thresholds: a second or three. More than 30 where there is one fold.
+HALF_WAVES_A_CALL = 1e5
+SECONDS_A_HALF_WAVE = 5e-6
+REMEDY = "a lower number of the transition (n), or fewer cables, take less"
 
 
 def solve_rows(
@@ -47,10 +57,18 @@ def solve_rows(
     codes = np.empty(rows, np.int64)
     # Copies, because broadcast views are read-only, and numba would compile the kernel anew for those.
     columns = [np.array(column, order="C") for column in (lam, w_f, n, excess)]
-    if rows >= PARALLEL_FROM:
-        solve_folds_parallel(*columns, a, gamma, slopes, states, error, codes)
-    else:
-        solve_folds(Cables(*columns), Folds(a, gamma, slopes, states, error, codes), 0, rows)
+    solved = a, gamma, slopes, states, error, codes
+    max_steps = scaled(STEPS, MOST_STEPS)
+    # A shot to a fold with more of them than that ends at its last step.
+    half_waves = np.where(columns[3] > 0.0, np.minimum(columns[2], max_steps / FEWEST), 0.0)
+    check_foreseen(SECONDS_A_HALF_WAVE * half_waves.sum(), f"{rows:,} critical states", REMEDY)
+    for part in batches(1.0 + half_waves, HALF_WAVES_A_CALL):
+        check_patience("critical states", REMEDY, done=part.start, of=rows)
+        some, into = [column[part] for column in columns], [column[part] for column in solved]
+        if len(some[0]) >= PARALLEL_FROM:
+            solve_folds_parallel(*some, *into, max_steps)
+        else:
+            solve_folds(Cables(*some), Folds(*into), max_steps, 0, len(some[0]))
     with np.errstate(over="ignore"):
         tension = np.where(codes == status.OK, np.hypot(w_f + lam, states[:, 1]), np.nan)
     return {
@@ -85,6 +103,8 @@ def solve_critical(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Critical
     ------
     ValueError
         For numbers out of range, and what is not a number.
+    TooMuchWork
+        If they take longer than `towatlas.patience` allows; one row too long for it has the status STEP_LIMIT.
 
     Notes
     -----
@@ -107,5 +127,6 @@ def solve_critical(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Critical
     check_positive_finite("w_f", w_f, zero=True)
     lam, w_f, n = check_broadcast(lam=lam, w_f=w_f, n=check_order(n))
     cables: dict[str, Any] = {"lam": lam.ravel(), "w_f": w_f.ravel(), "n": n.ravel()}
-    columns = solve_rows(**cables, excess=unchecked_excess_length(**cables))
+    with patience():
+        columns = solve_rows(**cables, excess=unchecked_excess_length(**cables))
     return CriticalStates(n=n, lam=lam, w_f=w_f, **{name: column.reshape(n.shape) for name, column in columns.items()})

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.checks import check_one
+from towatlas.effort import TooMuchWork, check_patience, patience, scaled
 from towatlas.kernels import status
 from towatlas.numerics.hermite import cubic
 from towatlas.numerics.rows import EPS, bracket
@@ -26,8 +27,10 @@ CLOSE = 0.01
 FINEST = 1e-6  # shortest interval in log a
 # Shots are followed beyond the longest cable, so that none of its equilibria hides at the end of the search.
 MARGIN = 1.5
-# Half waves on the longest shot beyond which a search, of thousands of such shots, is refused: some twenty seconds.
-HALF_WAVES = 500.0
+# Half waves on the longest shot beyond which a search, of thousands of such shots, is refused: with the default
+# patience, for it takes some twenty seconds at least; at most.
+HALF_WAVES, MOST_HALF_WAVES = 500, 10**6
+REMEDY = "a shorter longest cable (--max-length) or a slower tow has fewer nodes"
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -97,7 +100,8 @@ def cables_to_depth(*, w_f: float, gamma: float, z_f: float, lam_max: float) -> 
     ValueError
         For numbers out of range, and what is not one number.
     ArithmeticError
-        If a shot overflows, the search does not converge, or would take minutes (HALF_WAVES).
+        If a shot overflows, the search does not converge, or takes longer than `towatlas.patience` allows
+        (TooMuchWork).
 
     Notes
     -----
@@ -113,6 +117,11 @@ def cables_to_depth(*, w_f: float, gamma: float, z_f: float, lam_max: float) -> 
     """
     w_f, gamma = check_one("w_f", w_f, zero=True), check_one("gamma", gamma)
     z_f, lam_max = check_one("z_f", z_f), check_one("lam_max", lam_max)
+    with patience():
+        return _cables_to_depth(w_f=w_f, gamma=gamma, z_f=z_f, lam_max=lam_max)
+
+
+def _cables_to_depth(*, w_f: float, gamma: float, z_f: float, lam_max: float) -> CablesToDepth:
     search = _Search(w_f=w_f, gamma=gamma, z_f=z_f, lam_max=lam_max)
     low, high = search.ends()
     empty = np.empty(0)
@@ -172,6 +181,7 @@ class _Search:
         state, counts = np.full((rows, 6), np.nan), np.zeros(rows, np.int64)
 
         def depth(tau: Array, i: Integers) -> tuple[Array, Array]:
+            check_patience("shots to the depth", REMEDY)
             ends, count, codes = self.shoot(a[i], np.full(len(i), self.mu), tau)
             _check(codes)
             state[i], counts[i] = ends, count
@@ -199,10 +209,11 @@ def _half_waves(*, w_f: float, gamma: float, lam_max: float) -> int:
         lam=np.array([MARGIN * lam_max]), w_f=np.array([w_f]), gamma=np.array([gamma]), shoot=shoot_singly
     )
     _check(codes)
-    if highest[0] > HALF_WAVES:
-        raise ArithmeticError(
+    if highest[0] > scaled(HALF_WAVES, MOST_HALF_WAVES):
+        raise TooMuchWork(
             f"cables up to {lam_max:g} tow radii long would have shapes of up to {highest[0] / MARGIN:.0f} nodes at "
-            "this speed, too many to search; name a shorter longest cable (--max-length)"
+            "this speed, too many to search; name a shorter longest cable (--max-length), or go on with --patience "
+            "SECONDS"
         )
     return int(highest[0])
 
@@ -263,6 +274,7 @@ def _sampled(search: _Search, low: float, high: float) -> tuple[Array, Array, Ar
     right = left + 1
     while len(left):
         width = x[right] - x[left]
+        check_patience(f"searching offsets of the fish, {len(x):,} tried and {len(left):,} to come", REMEDY)
         middle = 0.5 * (x[left] + x[right])
         ends = search.at(middle)
         between = cubic(value[left], value[right], slope[left], slope[right], width, 0.5)

@@ -6,20 +6,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.checks import check_speed
+from towatlas.effort import TooMuchWork, check_foreseen, check_patience, patience
 from towatlas.kernels import status
-from towatlas.limits import threshold_offset, unchecked_excess_length
+from towatlas.limits import threshold_offset
 from towatlas.results import Equilibria
-from towatlas.solve.critical import solve_rows
+from towatlas.solve.batches import batches
 from towatlas.solve.drag_equilibria import NEAR_AXIS, solve_drag_equilibria
-from towatlas.solve.members import Members, extrema, shoot_lanes, shoot_singly, solve_members
+from towatlas.solve.members import REMEDY, Members, extrema, shoot_lanes, shoot_singly, solve_members
+from towatlas.solve.passed import folds_passed
 from towatlas.system import System
 
 # Segments of the forward shot that bears witness to each root.
 WITNESS_SEGMENTS = 10_000
 # With more extrema than this the kernel of many lanes is worth its compilation.
 FEW = 50
-# Half waves on all shots of a kind together beyond which a cable is refused: half a minute.
-HALF_WAVES = 2e7
+# CPU time of a search, by the half waves of one shot to each equilibrium: measured, 1.2 to 20 microseconds [s].
+SECONDS_A_HALF_WAVE = 1.2e-6
+# Rows of those forward shots in one call: a second.
+WITNESSES_A_CALL = 2000.0
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -76,7 +80,7 @@ def equilibria(
     ValueError
         For numbers out of range, and what is not one number.
     ArithmeticError
-        If the computation overflows, does not converge, or would take minutes (HALF_WAVES).
+        If the computation overflows, does not converge, or takes longer than `towatlas.patience` allows (TooMuchWork).
 
     Notes
     -----
@@ -99,7 +103,8 @@ def equilibria(
     ([36.8139, 0.0435, 38.7821], [1, 1, 0], 1)
     """
     system = System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t, C_s=C_s, b_s=b_s)
-    return solve_equilibria(system, check_speed(gamma))
+    with patience():
+        return solve_equilibria(system, check_speed(gamma))
 
 
 def solve_equilibria(system: System, gamma: float) -> Equilibria:
@@ -118,7 +123,7 @@ def solve_equilibria(system: System, gamma: float) -> Equilibria:
     Raises
     ------
     ArithmeticError
-        If the computation overflows, does not converge, or would take minutes (HALF_WAVES).
+        If the computation overflows, does not converge, or takes longer than `towatlas.patience` allows (TooMuchWork).
     """
     if not system.in_vacuum:
         return solve_drag_equilibria(system, gamma)
@@ -173,8 +178,10 @@ def _boundary_errors(system: System, gamma: float, r_x0: Array) -> Array:
 
     rows = len(r_x0)
     errors, x_end, r_x_end = np.empty(rows), np.empty(rows), np.empty(rows)
-    cable = (np.full(rows, value) for value in (system.lam, system.w_f, gamma))
-    forward_shots(*cable, r_x0, WITNESS_SEGMENTS, errors, x_end, r_x_end, 0, rows)
+    cable = [np.full(rows, value) for value in (system.lam, system.w_f, gamma)]
+    for part in batches(np.ones(rows), WITNESSES_A_CALL):
+        check_patience("forward shots", REMEDY, done=part.start, of=rows)
+        forward_shots(*cable, r_x0, WITNESS_SEGMENTS, errors, x_end, r_x_end, part.start, part.stop)
     return errors
 
 
@@ -190,41 +197,26 @@ def solve_branch(branch: str, *, lam: Array, w_f: Array, gamma: Array) -> tuple[
     Returns
     -------
     nodes : ndarray of int, shape (rows,)
+        -1 where their number is not known, with status STEP_LIMIT.
     members : Members
     """
     n = np.zeros(len(lam), np.int64)
     if branch == "median":
         n = folds_passed(w_f=w_f, lam=lam, gamma=gamma)
-    members = solve_members(lam=lam, w_f=w_f, gamma=gamma, n=n, outer=np.zeros(len(lam), bool), shoot=shoot_lanes)
+    known = n >= 0
+    members = solve_members(
+        lam=lam, w_f=w_f, gamma=gamma, n=np.maximum(n, 0), outer=np.zeros(len(lam), bool), shoot=shoot_lanes
+    )
+    if not known.all():
+        for name in ("a", "R_x0", "x_f", "z_f", "error"):
+            getattr(members, name)[~known] = np.nan
+        members.status[~known] = status.STEP_LIMIT
     return n, members
 
 
-def folds_passed(*, lam: Array, w_f: Array, gamma: Array) -> NDArray[np.int64]:
-    """Number of critical speeds below gamma, for each row; no checks.
-
-    Parameters
-    ----------
-    lam, w_f, gamma : ndarray, shape (rows,)
-        Cable length, fish weight and speed [-].
-
-    Returns
-    -------
-    ndarray of int, shape (rows,)
-    """
-    passed = np.zeros(len(lam), np.int64)
-    rows = np.arange(len(lam))
-    while len(rows):
-        n = passed[rows] + 1
-        excess = unchecked_excess_length(lam=lam[rows], w_f=w_f[rows], n=n)
-        states = solve_rows(n=n, w_f=w_f[rows], lam=lam[rows], excess=excess)
-        # One that rounding hides lies next to its threshold, beyond any speed.
-        rows = rows[(states["status"] == status.OK) & (states["gamma"] < gamma[rows])]
-        passed[rows] += 1
-    return passed
-
-
 def _failure(system: System, gamma: float, code: int) -> ArithmeticError:
-    return ArithmeticError(f"lam = {system.lam:g}, w_f = {system.w_f:g}, gamma = {gamma:g}: {status.SENTENCES[code]}")
+    kind = TooMuchWork if code == status.STEP_LIMIT else ArithmeticError
+    return kind(f"lam = {system.lam:g}, w_f = {system.w_f:g}, gamma = {gamma:g}: {status.SENTENCES[code]}")
 
 
 def _highest(system: System, gamma: float) -> int:
@@ -234,8 +226,11 @@ def _highest(system: System, gamma: float) -> int:
     lam, w_f = system.lam, system.w_f
     half_waves = 2.0 / np.pi * gamma * lam / (np.sqrt(w_f + lam) + np.sqrt(w_f))
     possible = float(np.ceil((lam + 1.0 - threshold_offset(w_f)) / 2.0))
-    if half_waves * (1.0 + 2.0 * min(possible, half_waves)) > HALF_WAVES:
-        raise _failure(system, gamma, status.STEP_LIMIT)
+    nodes = min(possible, half_waves)
+    if half_waves < np.inf:
+        seconds = SECONDS_A_HALF_WAVE * half_waves * (1.0 + 2.0 * nodes)
+        shapes = f"shots of {np.rint(half_waves):,.12g} half waves to shapes of up to {np.rint(nodes):,.12g} nodes"
+        check_foreseen(seconds, shapes, REMEDY)
     cable = (np.array([value]) for value in (lam, w_f, gamma))
     highest, codes = extrema(**dict(zip(CABLE, cable, strict=True)), shoot=shoot_singly)
     if codes[0] != status.OK:

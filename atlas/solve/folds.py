@@ -16,14 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.checks import check_real, check_speed
+from towatlas.effort import patience
 from towatlas.kernels import status
 from towatlas.kernels.system import COLUMNS, M_F, W_F, W
 from towatlas.numerics.curves import Steps, follow
 from towatlas.numerics.rows import EPS, newton
 from towatlas.results import Folds
 from towatlas.solve.critical import solve_critical
-from towatlas.solve.equilibria import folds_passed
 from towatlas.solve.jets import Jets, jets_of
+from towatlas.solve.passed import folds_passed
 from towatlas.solve.search import search
 from towatlas.solve.shots import Array, Integers, direction_of, shoot
 from towatlas.system import System
@@ -368,10 +369,11 @@ def folds(
     speed = check_speed(numbers.pop("gamma"))
     low, high = sorted(np.abs(ends))
     system = System.of(**numbers, m_f=m_f, w=w, C_s=C_s, b_s=b_s)
-    if name == "gamma" and system.in_vacuum:
-        return _in_vacuum(system, float(low), float(high), np.sign(speed))
     moved = ("w_f", "m_f") if name == "w_f" and m_f is None else (name,)
-    return solve_folds_between(system, speed, moved, high / low)
+    with patience():
+        if name == "gamma" and system.in_vacuum:
+            return _in_vacuum(system, float(low), float(high), np.sign(speed))
+        return solve_folds_between(system, speed, moved, high / low)
 
 
 def solve_folds_between(system: System, gamma: float, moved: tuple[str, ...], factor: float) -> Folds:

@@ -13,8 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from towatlas.effort import check_patience, scaled
 from towatlas.kernels import status
 from towatlas.numerics.rows import EPS
+from towatlas.solve.batches import batches
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -27,7 +29,13 @@ LINEAR = 1e-12
 # that the bracket needs slack.
 BEYOND = 1.01
 ROUNDS = 200
-MAX_STEPS = 10**7
+# Steps of one shot: with the default patience, two seconds or three; at most.
+STEPS, MOST_STEPS = 2 * 10**6, 10**7
+# Steps of all shots of one call, singly and sixteen at a time: about two seconds.
+STEPS_SINGLY, STEPS_IN_LANES = 10**6, 8 * 10**6
+# Steps to a half wave: never fewer; of waves that do not bend the cable; more for each e-fold by which they do.
+FEWEST, STRAIGHT, BENT = 2.0, 3.0, 4.0
+REMEDY = "a shorter cable (lam) or a lower speed (gamma) has fewer nodes"
 TINY = 1e-140
 # Steps in log a: one below this is made on the results instead of by another shot, the square of it being rounding.
 LAST_STEP = 1e-8
@@ -84,17 +92,19 @@ def shoot_lanes(a: Array, mu: Array, tau: Array) -> tuple[Array, Integers, Integ
     ndarray of int, shape (rows,)
         Statuses.
     """
-    from towatlas.kernels.lanes import END_COLUMNS, FOLD_COLUMNS, march
+    from towatlas.kernels.lanes import FOLD_COLUMNS, march
     from towatlas.kernels.sweeps import march_parallel
 
-    rows = len(a)
-    ends, counts, statuses = np.empty((rows, END_COLUMNS)), np.empty(rows, np.int64), np.empty(rows, np.int64)
-    folds, none = np.empty((rows, 1, FOLD_COLUMNS)), np.zeros(rows, np.int64)
-    if rows >= PARALLEL_FROM:
-        march_parallel(a, mu, tau, none, none, MAX_STEPS, ends, folds, counts, statuses)
-    else:
-        march(a, mu, tau, none, none, MAX_STEPS, ends, folds, counts, statuses, 0, rows)
-    return ends, counts, statuses
+    def shoot(max_steps: int, a: Array, mu: Array, tau: Array, *results: NDArray) -> None:
+        rows = len(a)
+        ends, counts, statuses = results
+        folds, none = np.empty((rows, 1, FOLD_COLUMNS)), np.zeros(rows, np.int64)
+        if rows >= PARALLEL_FROM:
+            march_parallel(a, mu, tau, none, none, max_steps, ends, folds, counts, statuses)
+        else:
+            march(a, mu, tau, none, none, max_steps, ends, folds, counts, statuses, 0, rows)
+
+    return _in_batches(shoot, STEPS_IN_LANES, a, mu, tau)
 
 
 def shoot_singly(a: Array, mu: Array, tau: Array) -> tuple[Array, Integers, Integers]:
@@ -112,10 +122,56 @@ def shoot_singly(a: Array, mu: Array, tau: Array) -> tuple[Array, Integers, Inte
     """
     from towatlas.kernels.vacuum_single import shoot_each
 
+    def shoot(max_steps: int, a: Array, mu: Array, tau: Array, *results: NDArray) -> None:
+        shoot_each(a, mu, tau, max_steps, *results)
+
+    return _in_batches(shoot, STEPS_SINGLY, a, mu, tau)
+
+
+def _in_batches(
+    shoot: Callable[..., None], steps_a_call: int, a: Array, mu: Array, tau: Array
+) -> tuple[Array, Integers, Integers]:
+    """Shots in calls of a few seconds each; those too long for one are not begun, and their status is STEP_LIMIT."""
     rows = len(a)
-    ends, counts, statuses = np.empty((rows, 6)), np.empty(rows, np.int64), np.empty(rows, np.int64)
-    shoot_each(a, mu, tau, MAX_STEPS, ends, counts, statuses)
+    ends, counts, statuses = np.full((rows, 6), np.nan), np.zeros(rows, np.int64), np.full(rows, status.STEP_LIMIT)
+    max_steps = scaled(STEPS, MOST_STEPS)
+    half_waves, steps = expected_work(a, mu, tau)
+    short = ~(FEWEST * half_waves > max_steps)
+    if not short.all():
+        if short.any():
+            some = _in_batches(shoot, steps_a_call, a[short], mu[short], tau[short])
+            ends[short], counts[short], statuses[short] = some
+        return ends, counts, statuses
+    for part in batches(1.0 + np.minimum(steps, max_steps), steps_a_call):
+        check_patience("shooting along the cable", REMEDY)
+        shoot(max_steps, *(column[part] for column in (a, mu, tau, ends, counts, statuses)))
     return ends, counts, statuses
+
+
+def expected_work(a: Array, mu: Array, tau: Array) -> tuple[Array, Array]:
+    """Half waves on shots, and steps of the kernels: estimates, in closed form.
+
+    Parameters
+    ----------
+    a, mu, tau : ndarray, shape (rows,)
+        As of `shoot_lanes`.
+
+    Returns
+    -------
+    half_waves : ndarray, shape (rows,)
+        A little fewer than there are [-], >= 0; nan for bad numbers.
+    steps : ndarray, shape (rows,)
+        Within a factor of about two, of shots with many half waves [-], >= 0.
+
+    Notes
+    -----
+    The phase of the wave is the integral of dt / sqrt(r), and the tension r <= H + tau with H = r + p^2 / 2 at the
+    fish. The more H exceeds the weight, the narrower the layers in which the tension falls to it.
+    """
+    with np.errstate(all="ignore"):
+        bent = mu * a * (a / (1.0 + np.hypot(1.0, a))) + 0.5 * a * a
+        half_waves = 2.0 / np.pi * tau / (np.sqrt(mu + bent + tau) + np.sqrt(mu + bent))
+        return half_waves, half_waves * (STRAIGHT + BENT * np.log1p(8.0 * bent / tau))
 
 
 def extrema(*, lam: Array, w_f: Array, gamma: Array, shoot: Shoot) -> tuple[Integers, Integers]:
@@ -190,6 +246,7 @@ def solve_members(
     for round_ in range(ROUNDS):
         if not len(i):
             break
+        check_patience("searching for equilibria", REMEDY, done=rows - len(i), of=rows)
         a = np.exp(x[i])
         ends, counts, statuses = shoot(a, mu[i], tau[i])
         p, q = ends[:, 2], ends[:, 5]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from towatlas.effort import check_patience
 from towatlas.kernels.system import C_S, COLUMNS, W_F, W
 from towatlas.solve.jets import Jets
 
@@ -13,6 +14,9 @@ Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 MAX_STEPS = 10**5
+# Shots between two looks at the clock: all of the longest, some seconds.
+BATCH = 256
+REMEDY = "long cables, high speeds and strong drag make shots long"
 
 
 @dataclass(frozen=True)
@@ -108,10 +112,11 @@ def shoot(
         rows_of[upward != port, C_S] *= -1.0
     state, steps = np.empty((rows, RESULT_ROWS, len(jets))), np.empty(rows, np.int64)
     turns, codes = np.empty((rows, 2), np.int64), np.empty(rows, np.int64)
-    shots = Shots(r, np.square(speed), table, moved, part)
-    shoot_drag_threads(
-        shots, Algebra(jets.products, jets.places, jets.degree), MAX_STEPS, Reached(state, steps, turns, codes)
-    )
+    shots, algebra = Shots(r, np.square(speed), table, moved, part), Algebra(jets.products, jets.places, jets.degree)
+    reached = Reached(state, steps, turns, codes)
+    for begin in range(0, rows, BATCH):
+        check_patience("shots with drag", REMEDY)
+        shoot_drag_threads(shots, algebra, MAX_STEPS, reached, begin, min(rows, begin + BATCH))
     x, y = state[:, 0, 0], state[:, 1, 0]
     # Where no drag takes the cable out of its plane the angle grows by half a turn at every crossing of the axis.
     angle = np.where(y == 0.0, np.pi * turns[:, 1], np.arctan2(y, x) + 2.0 * np.pi * turns[:, 0])

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from towatlas.effort import patience
 from towatlas.results import DragFolds
 
 Array = NDArray[np.float64]
@@ -27,7 +28,8 @@ def critical_states(*, lam: Array, w_f: Array, n: Integers, excess: Array) -> di
     """
     from towatlas.solve.critical import solve_rows
 
-    return solve_rows(lam=lam, w_f=w_f, n=n, excess=excess)
+    with patience():
+        return solve_rows(lam=lam, w_f=w_f, n=n, excess=excess)
 
 
 def fish_positions(branch: str, *, lam: Array, w_f: Array, gamma: Array) -> dict[str, NDArray[Any]]:
@@ -45,7 +47,8 @@ def fish_positions(branch: str, *, lam: Array, w_f: Array, gamma: Array) -> dict
     """
     from towatlas.solve.equilibria import solve_branch
 
-    nodes, members = solve_branch(branch, lam=lam, w_f=w_f, gamma=gamma)
+    with patience():
+        nodes, members = solve_branch(branch, lam=lam, w_f=w_f, gamma=gamma)
     return {"nodes": nodes} | {name: getattr(members, name) for name in ("x_f", "z_f", "error", "status")}
 
 
@@ -62,4 +65,5 @@ def drag_folds(*, lam: Array, w_f: Array, C: Array, n: Integers) -> DragFolds:
     """
     from towatlas.solve.drag_folds import solve_drag_folds
 
-    return solve_drag_folds(lam, w_f, C, n)
+    with patience():
+        return solve_drag_folds(lam, w_f, C, n)

@@ -1,0 +1,197 @@
+"""How much CPU time a call may take before it has to say so: patience.
+
+Every public function that computes begins with a budget of its own, or uses that of the caller. Loops ask before each
+round whether it is used up. Time in which kernels are compiled does not count: it is spent once.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+
+from towatlas.kernels import notice
+
+# What a call may take unless told otherwise, s of CPU of the whole process, so that parallel kernels count in full.
+SECONDS = 30.0
+
+
+class TooMuchWork(ArithmeticError):
+    """A computation that was refused, or given up, because it takes more CPU time than allowed; see `patience`."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a call has come.
+
+    Attributes
+    ----------
+    what : str
+        What is being done.
+    used, seconds : float
+        CPU time used and allowed [s], >= 0; inf for no limit.
+    done, of : float
+        Part of `what` that is done, and all of it, in units of its own; nan where not known.
+    """
+
+    what: str
+    used: float
+    seconds: float
+    done: float = float("nan")
+    of: float = float("nan")
+
+    @property
+    def known(self) -> bool:
+        """Whether it is known how much is done."""
+        return self.done == self.done
+
+    @property
+    def words(self) -> str:
+        """What is being done, and how far it has come where that is known."""
+        if not self.known:
+            return self.what
+        return f"{self.what}, {self.done:,.6g} {f'of {self.of:,.6g} ' if self.of == self.of else ''}done"
+
+
+@dataclass(frozen=True)
+class _Budget:
+    seconds: float
+    began: float
+
+    @property
+    def used(self) -> float:
+        return _clock() - self.began
+
+
+_budget: ContextVar[_Budget | None] = ContextVar("towatlas_patience", default=None)
+_listener: Callable[[Progress | None], object] = repr
+
+
+def _clock() -> float:
+    """CPU time of this process without compilations, s."""
+    return time.process_time() - notice.compilation_seconds()
+
+
+@contextmanager
+def patience(seconds: float = SECONDS) -> Iterator[None]:
+    """Allow everything within, together, so much CPU time; within another one, the outer counts.
+
+    Parameters
+    ----------
+    seconds : float
+        CPU time of the process without compilations [s], > 0; inf for no limit. Without this every call has 30 s.
+
+    Returns
+    -------
+    context manager
+        For `with`.
+
+    Raises
+    ------
+    ValueError
+        For what is not a positive number.
+    TooMuchWork
+        By what is called within, an ArithmeticError: at once where the work can be foreseen.
+
+    Examples
+    --------
+    >>> import towatlas
+    >>> with towatlas.patience(300):
+    ...     len(towatlas.equilibria(1000.0, 1.0, 1.0))
+    39
+    """
+    if isinstance(seconds, bool) or not isinstance(seconds, (int, float)) or not seconds > 0:
+        raise ValueError(f"seconds must be a positive number, of CPU time, or inf for no limit; got {seconds!r}")
+    if _budget.get() is not None:
+        try:
+            yield
+        finally:
+            _listener(None)
+        return
+    token = _budget.set(_Budget(seconds, _clock()))
+    try:
+        yield
+    finally:
+        _budget.reset(token)
+
+
+def scaled(limit: int, most: int) -> int:
+    """A limit of one call of a kernel, which grows and shrinks with the patience of the caller.
+
+    Parameters
+    ----------
+    limit : int
+        For SECONDS.
+    most : int
+        For any patience, and where nobody has set one.
+
+    Returns
+    -------
+    int
+    """
+    budget = _budget.get()
+    return most if budget is None else int(min(most, max(1.0, limit * budget.seconds / SECONDS)))
+
+
+def check_patience(what: str, remedy: str, *, done: float = float("nan"), of: float = float("nan")) -> None:
+    """Go on, or give up because the time is used up; called before every batch of work.
+
+    Parameters
+    ----------
+    what : str
+        What is being done, as "searching offsets of the fish".
+    remedy : str
+        What to ask for instead, as "a shorter cable (lam) has fewer nodes".
+    done, of : float
+        How much of it is done, and all of it, in the units that `what` speaks of; nan where not known.
+
+    Raises
+    ------
+    TooMuchWork
+    """
+    budget = _budget.get()
+    if budget is None:
+        return
+    progress = Progress(what, budget.used, budget.seconds, done, of)
+    _listener(progress)
+    if progress.used > budget.seconds:
+        raise TooMuchWork(f"{progress.words}: not finished in {budget.seconds:g} s of CPU; {_go_on(remedy)}")
+
+
+def check_foreseen(seconds: float, what: str, remedy: str) -> None:
+    """Refuse work before it begins where it would take longer than is left.
+
+    Parameters
+    ----------
+    seconds : float
+        Estimate of its CPU time [s].
+    what : str
+        What it is, as "shapes of up to 5000 nodes".
+    remedy : str
+        As of `check_patience`.
+
+    Raises
+    ------
+    TooMuchWork
+    """
+    budget = _budget.get()
+    # An estimate of nan, of what overflows, foresees nothing. What is used up already, the next check says.
+    if budget is not None and seconds > budget.seconds - budget.used > 0.0:
+        takes = f"{float(f'{seconds:.1g}'):g}" if seconds < 1e6 else "a million"
+        raise TooMuchWork(f"{what}, too many for {budget.seconds:g} s of CPU: {takes} s or more; {_go_on(remedy)}")
+
+
+def listen(listener: Callable[[Progress | None], object]) -> None:
+    """Have `listener` told how far calls have come.
+
+    Parameters
+    ----------
+    listener : callable
+        Called from within loops with a Progress, and with None where a call within another's patience ends.
+    """
+    global _listener
+    _listener = listener
+
+
+def _go_on(remedy: str) -> str:
+    return f"{remedy}, or go on with --patience SECONDS (in Python: with towatlas.patience(SECONDS))"
