@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from towatlas.solve.drag_folds import solve_drag_folds
     from towatlas.solve.equilibria import equilibria
     from towatlas.solve.folds import folds
+    from towatlas.solve.many import equilibria_many
     from towatlas.solve.shapes import shape, shape_of
     from towatlas.system import System
     from towatlas.tables.atlas import Atlas, open_atlas
@@ -36,6 +37,7 @@ __all__ = [
     "answer_scene",
     "design",
     "equilibria",
+    "equilibria_many",
     "excess_length",
     "folds",
     "massless_cable",
@@ -61,6 +63,7 @@ _HOMES = {
     "solve.drag_folds": ("solve_drag_folds",),
     "solve.equilibria": ("equilibria",),
     "solve.folds": ("folds",),
+    "solve.many": ("equilibria_many",),
     "solve.shapes": ("shape", "shape_of"),
     "system": ("System",),
     "tables.atlas": ("Atlas", "open_atlas"),

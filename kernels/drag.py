@@ -24,8 +24,8 @@ the cable meets the axis, where the steps shrink to the distance from it.
 
 Every Taylor coefficient in sigma is itself a short polynomial, a *jet*, in the unknowns of the problem: first and
 higher derivatives come out of the same recurrences as the solution, with no differences taken. Which monomials there
-are, and which products give which, is data (`towatlas.solve.jets`). `kernels.drag_slopes` is the same for the jets that
-the search needs, written out.
+are, and which products give which, is data (`towatlas.solve.jets`): `jets` has all products, `pairs` each two factors
+once. `kernels.drag_slopes` is the same for the jets that the search needs, written out.
 """
 
 from math import exp, log, sqrt
@@ -180,23 +180,26 @@ EVERY_GROUP = np.full(GROUPS, True)
 
 
 @helper
-def _add_product(c, a, b, k, first, last, factor, jets, count, q, at):
+def _add_product(c, a, b, k, first, last, factor, pairs, count, q, at):
     """Add factor times the terms first..last-1 of coefficient k of the product of a and b to that of q at `at`."""
-    for m in range(jets.shape[0]):
-        left = (a * count + jets[m, 0]) * KEPT
-        right = (b * count + jets[m, 1]) * KEPT + k
-        # Two chains of dependent additions instead of one.
-        even = broadcast(0.0)
-        odd = broadcast(0.0)
-        order = first
-        while order + 1 < last:
-            even = even + load(c, left + order) * load(c, right - order)
-            odd = odd + load(c, left + order + 1) * load(c, right - order - 1)
-            order += 2
-        if order < last:
-            even = even + load(c, left + order) * load(c, right - order)
-        place = (q * count + jets[m, 2]) * KEPT + at
-        store(c, place, load(c, place) + factor * (even + odd))
+    for m in range(pairs.shape[0]):
+        i, j = pairs[m, 0], pairs[m, 1]
+        left, right = (a * count + i) * KEPT, (b * count + j) * KEPT + k
+        one = broadcast(0.0)
+        if i == j or a == b:
+            for order in range(first, last):
+                one = one + load(c, left + order) * load(c, right - order)
+            if i != j:
+                one = one + one
+        else:
+            other = broadcast(0.0)
+            left_too, right_too = (a * count + j) * KEPT, (b * count + i) * KEPT + k
+            for order in range(first, last):
+                one = one + load(c, left + order) * load(c, right - order)
+                other = other + load(c, left_too + order) * load(c, right_too - order)
+            one = one + other
+        place = (q * count + pairs[m, 2]) * KEPT + at
+        store(c, place, load(c, place) + factor * one)
 
 
 @helper
@@ -238,7 +241,7 @@ def _root(c, q, jets, count):
 
 
 @helper
-def run(c, p, program, k, jets, count, groups):
+def run(c, p, program, k, jets, pairs, count, groups):
     """Run the rows of a program at order k; groups[g] says whether group g is on.
 
     A table, for it compiles in a fraction of the time of calls written out.
@@ -280,7 +283,7 @@ def run(c, p, program, k, jets, count, groups):
             left = q
             if operation == ROOT:
                 first, right = FIRST, q
-        _add_product(c, left, right, order, first, last, weight, jets, count, q, at)
+        _add_product(c, left, right, order, first, last, weight, pairs, count, q, at)
         if operation == ROOT and k == 0:
             _root(c, q, jets, count)
         elif operation in (ROOT, RATIO):
@@ -295,25 +298,25 @@ def clear(c, first, last, count, k):
 
 
 @helper
-def set_tension(c, p, jets, count):
+def set_tension(c, p, jets, pairs, count):
     """The tension from the force."""
     clear(c, T, T + 1, count, ZERO)
     clear(c, T2, T2 + 1, count, ZERO)
-    run(c, p, TENSION, ZERO, jets, count, EVERY_GROUP)
+    run(c, p, TENSION, ZERO, jets, pairs, count, EVERY_GROUP)
 
 
 @helper
-def expand_jets(c, p, jets, count, groups):
+def expand_jets(c, p, jets, pairs, count, groups):
     """Taylor coefficients of the equations above in sigma over the pace, from the state at order 0."""
-    set_tension(c, p, jets, count)
+    set_tension(c, p, jets, pairs, count)
     clear(c, STATE, SLANT, count, ZERO)
     for q in (X, Y):
-        _add_product(c, q, q, ZERO, ZERO, FIRST, broadcast(1.0), jets, count, RHO2, ZERO)
+        _add_product(c, q, q, ZERO, ZERO, FIRST, broadcast(1.0), pairs, count, RHO2, ZERO)
     for k in range(np.int64(ORDER)):
         clear(c, ZERO, STATE + 1, count, k + 1)
         if k > 0:
             clear(c, STATE + 1, SLANT, count, k)
-        run(c, p, EQUATIONS, k, jets, count, groups)
+        run(c, p, EQUATIONS, k, jets, pairs, count, groups)
 
 
 @helper
@@ -460,15 +463,15 @@ def set_parameters(p, lane, r, gamma2, system, direction, places, count):
 
 
 @helper
-def start(c, p, jets, count, bare):
+def start(c, p, jets, pairs, count, bare):
     """In all lanes: states at the fish, or just above bare tips; the cable paid out at U, that to be paid out at RA.
 
     bare : whether the force at the end of the cable is none, else it is that on the fish.
     """
     clear(c, ZERO, QUANTITIES, count, ZERO)
     store(c, UPRIGHT * count * KEPT, broadcast(1.0))
-    run(c, p, CABLE, ZERO, jets, count, EVERY_GROUP)
-    run(c, p, TIP if bare else FISH, ZERO, jets, count, EVERY_GROUP)
+    run(c, p, CABLE, ZERO, jets, pairs, count, EVERY_GROUP)
+    run(c, p, TIP if bare else FISH, ZERO, jets, pairs, count, EVERY_GROUP)
     if bare:
         _raise_tip(c, p, count)
     else:
@@ -521,16 +524,16 @@ def _raise_tip(c, p, count):
 
 
 @helper
-def finish(c, p, jets, count):
+def finish(c, p, jets, pairs, count):
     """In all lanes: the tension of the state, and at E log(rho / gamma^2), jets."""
-    set_tension(c, p, jets, count)
+    set_tension(c, p, jets, pairs, count)
     clear(c, STATE, SLANT, count, ZERO)
-    run(c, p, SQUARED_RADIUS, ZERO, jets, count, EVERY_GROUP)
+    run(c, p, SQUARED_RADIUS, ZERO, jets, pairs, count, EVERY_GROUP)
     # log(a (1 + x)) = log a + x - x^2 / 2 + x^3 / 3, x without a constant: nothing follows in a jet of third degree.
     leading, speed2 = load(c, RHO2 * count * KEPT), load(p, SPEED2 * count)
     for n in range(1, count):
         store(c, (D * count + n) * KEPT, load(c, (RHO2 * count + n) * KEPT) / leading)
-    run(c, p, POWERS, ZERO, jets, count, EVERY_GROUP)
+    run(c, p, POWERS, ZERO, jets, pairs, count, EVERY_GROUP)
     for n in range(1, count):
         x = load(c, (D * count + n) * KEPT)
         x2, x3 = load(c, (MB * count + n) * KEPT), load(c, (B * count + n) * KEPT)

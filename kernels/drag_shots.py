@@ -75,9 +75,10 @@ class Shots(NamedTuple):
 
 
 class Algebra(NamedTuple):
-    """A kind of jet: products and places as in `towatlas.solve.jets`, and the degree."""
+    """A kind of jet: products, pairs and places as in `towatlas.solve.jets`, and the degree."""
 
     products: Any
+    pairs: Any
     places: Any
     degree: Any
 
@@ -165,7 +166,7 @@ def _begin(shots, algebra, jobs, fresh, work, count):
     for which in range(2):
         if not (any_bare if which else any_fish):
             continue
-        start(scratch, p, algebra.products, count, which == 1)
+        start(scratch, p, algebra.products, algebra.pairs, count, which == 1)
         for lane in range(LANES):
             if not fresh[lane] or bare[lane] != (which == 1):
                 continue
@@ -184,7 +185,7 @@ def _end(reached, algebra, jobs, over, work, count):
     c, scratch, p = work[0], work[1], work[2]
     for row in range(X * count, STATE * count):
         store(scratch, row * KEPT, load(c, row * KEPT))
-    finish(scratch, p, algebra.products, count)
+    finish(scratch, p, algebra.products, algebra.pairs, count)
     for lane in range(LANES):
         if over[lane]:
             i = jobs[lane]
@@ -282,7 +283,7 @@ def shoot_drag(shots, algebra, max_steps, reached, begin, stop):
         if fast and not groups[ON_SIDE]:
             expand_slopes(c, p, groups[ON_TANGENT])
         else:
-            expand_jets(c, p, algebra.products, count, groups)
+            expand_jets(c, p, algebra.products, algebra.pairs, count, groups)
         step_lengths(c, p, count, room, h)
         store(room, SECOND, values(c, U * count * KEPT, FIRST, load(h, ZERO)))
         for lane in range(LANES):

@@ -20,7 +20,6 @@ from towatlas.scene.choice import choose, compare, least_model
 from towatlas.scene.file import make_scene, read_scene
 from towatlas.scene.jumps import answer_scene
 from towatlas.scene.models import QUESTIONS, check_questions, solvable_models, solve_model
-from towatlas.scene.pairs import PairSpeeds, follow_folds, pair_speeds
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.system import System
 

@@ -11,7 +11,7 @@ from towatlas.commands.common import speed as dimensionless_speed
 from towatlas.kernels import status
 from towatlas.scene.choice import Choice, percent
 from towatlas.scene.file import read_scene, shipped_scenes
-from towatlas.scene.jumps import Jumps, SceneAnswer, answer_scene
+from towatlas.scene.jumps import LOOKED, NEAR, Jumps, SceneAnswer, answer_scene
 from towatlas.scene.models import QUESTIONS, check_questions
 from towatlas.scene.scene import KNOT, MODELS, Scene
 from towatlas.tables.atlas import Atlas, open_atlas
@@ -154,22 +154,25 @@ def _equilibria(answer: SceneAnswer) -> list[dict[str, Any]]:
     return rows
 
 
-def _pairs(answer: SceneAnswer) -> list[dict[str, Any]]:
-    """Critical speeds of the model used, where it has drag."""
-    scene, pairs = answer.scene, answer.choice.answer.speeds
-    if answer.choice.model == "vacuum":
+def _folds(answer: SceneAnswer) -> list[dict[str, Any]]:
+    """Jumps of the model used, all that there are between the speeds looked at."""
+    scene, folds = answer.scene, answer.choice.answer.folds
+    if folds is None:
         return []
     words = status.FLAG_MEANINGS.split()
     return [
         {
-            "n": int(pairs.n[k]),
-            "appears": speeds(scene, float(pairs.appears[k])),
-            "ends": speeds(scene, float(pairs.ends[k])),
-            "C_cusp": real(pairs.C_cusp[k]),
-            "status": words[int(pairs.status[k])],
-            "status_ends": words[int(pairs.status_ends[k])],
+            **speeds(scene, float(folds.gamma[k])),
+            "r_f_m": float(folds.r_f[k] * scene.radius),
+            "shapes_below": int(folds.shapes_below[k]),
+            "shapes_above": int(folds.shapes_above[k]),
+            "n": int(folds.n[k]) or None,
+            "origin": str(folds.origin[k]),
+            "error": real(folds.error[k]),
+            "near": abs(float(folds.gamma[k]) / scene.gamma - 1.0) <= NEAR,
+            "status": words[int(folds.status[k])],
         }
-        for k in range(len(pairs.n))
+        for k in range(len(folds))
     ]
 
 
@@ -212,7 +215,8 @@ def _object(answer: SceneAnswer) -> dict[str, Any]:
         "transitions": answer.jumps.existing,
         "critical_speeds_model": "vacuum",
         "critical_speeds": _jumps(scene, answer.jumps),
-        "critical_speeds_with_drag": _pairs(answer),
+        "jumps": _folds(answer),
+        "jumps_looked_at": [speeds(scene, scene.gamma * share) for share in LOOKED],
         "equilibria": _equilibria(answer),
         "searched": answer.equilibria.searched,
     }
@@ -240,8 +244,8 @@ def text_of(answer: SceneAnswer) -> str:
     for name in by_model["vacuum"]:
         lines.append(f"{name:<8}" + "".join(f" {_cell(by_model[model][name]):>12}" for model in MODELS))
     lines += ["", *_model_lines(answer.choice), "", *_jump_lines(answer), ""]
-    if _pairs(answer):
-        lines += [*_pair_lines(answer), ""]
+    if answer.choice.model != "vacuum" and answer.choice.answer.folds is not None:
+        lines += [*_fold_lines(answer), ""]
     lines.append(
         f"equilibria ({answer.choice.model} model), the fish in m, forces in N, its phase behind the tow point"
     )
@@ -269,18 +273,22 @@ def _model_lines(choice: Choice) -> list[str]:
     return lines
 
 
-def _pair_lines(answer: SceneAnswer) -> list[str]:
-    """Critical speeds with drag."""
-    lines = [f"critical speeds ({answer.choice.model} model) of the last pair passed and the next, m/s"]
-    lines.append(f"{'n':>5} {'appears':>13} {'ends':>13} {'C':>13} {'gone above':>13}")
-    drag = answer.choice.answer.system.C
-    for row in _pairs(answer):
-        cells = [
-            row[code] if row[name]["speed_m_s"] is None else _cell(row[name]["speed_m_s"], 8)
-            for name, code in (("appears", "status"), ("ends", "status_ends"))
-        ]
-        cells += [_cell(drag, 6), _cell(row["C_cusp"], 6)]
-        lines.append(f"{row['n']:>5} " + " ".join(f"{cell:>13}" for cell in cells))
+def _fold_lines(answer: SceneAnswer) -> list[str]:
+    """Jumps with drag."""
+    scene, folds = answer.scene, answer.choice.answer.folds
+    assert folds is not None
+    low, high = (_cell(scene.speed_of(scene.gamma * share), 4) for share in LOOKED)
+    rows = _folds(answer)
+    lines = [f"jumps ({answer.choice.model} model) from {low} to {high} m/s{'' if rows else ': none'}"]
+    if rows:
+        lines.append(f"{'gamma':>13} {'m/s':>13} {'kn':>13} {'rpm':>13}  {'shapes':>9}  made by")
+    for row in rows:
+        cells = " ".join(f"{_cell(row[name], 8):>13}" for name in ("gamma", "speed_m_s", "speed_kn", "rpm"))
+        origin = f"vacuum, n = {row['n']}" if row["n"] else "drag"
+        shapes = f"{row['shapes_below']} to {row['shapes_above']}"
+        lines.append(f"{cells}  {shapes:>9}  {origin}{', within 10 % of the speed' if row['near'] else ''}")
+    if not folds.complete:
+        lines.append("not everywhere made out: some may be missing")
     return lines
 
 

@@ -10,9 +10,10 @@ from math import isfinite, isnan, nan
 
 import numpy as np
 
+from towatlas.effort import TooMuchWork
 from towatlas.kernels import status
+from towatlas.results import Folds
 from towatlas.scene.models import QUESTIONS, ModelAnswer, check_questions, solvable_models, solve_model
-from towatlas.scene.pairs import ABSENT, PairSpeeds
 from towatlas.scene.scene import Scene, check_model
 
 
@@ -35,7 +36,7 @@ class Difference:
     relative : float
         Their difference [-], >= 0; nan where none can be given.
     agrees : bool
-        Within the tolerance. Whole numbers agree if they are the same, speeds if neither exists; what is not known does
+        Within the tolerance. Whole numbers agree if they are the same, jumps if neither exists; what is not known does
         not agree.
     status_smaller, status_larger : int
         Codes of `towatlas.kernels.status`.
@@ -71,10 +72,10 @@ class Difference:
         Returns
         -------
         by_smaller, by_larger : str
-            "none" for what does not exist, "not known" for what could not be had.
+            "none" for what there is not between the speeds looked at, "not known" for what could not be had.
         """
         by_smaller, by_larger = (
-            form.format(value) if code == status.OK else "none" if code in ABSENT else "not known"
+            form.format(value) if code == status.OK else "none" if code == status.NOT_FOUND else "not known"
             for value, code in ((self.by_smaller, self.status_smaller), (self.by_larger, self.status_larger))
         )
         return by_smaller, by_larger
@@ -178,16 +179,14 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
 
 
-def compare(smaller: ModelAnswer, larger: ModelAnswer, scene: Scene, orders: Sequence[int]) -> list[Difference]:
-    """All quantities of two models; critical speeds of the pairs given.
+def compare(smaller: ModelAnswer, larger: ModelAnswer, scene: Scene) -> list[Difference]:
+    """All quantities of two models; where both looked for jumps, the nearest below and above the speed, too.
 
     Parameters
     ----------
     smaller, larger : ModelAnswer
     scene : Scene
         Whose tolerance decides.
-    orders : sequence of int
-        Numbers of the pairs.
 
     Returns
     -------
@@ -208,30 +207,44 @@ def compare(smaller: ModelAnswer, larger: ModelAnswer, scene: Scene, orders: Seq
     near, slant = (float(np.linalg.norm(answer.position - tow_point)) for answer in (smaller, larger))
     moved = float(np.linalg.norm(smaller.position - larger.position)) / slant
     pulled = abs(smaller.tension / larger.tension - 1.0)
-    return [
+    found = [
         difference("nodes", "number of nodes", "", smaller.nodes, larger.nodes, nan),
         difference("position", "position of the fish", "m", near, slant, moved),
         difference("tension", "tow tension", "N", smaller.tension, larger.tension, pulled),
         difference("speeds", "number of equilibria", "", smaller.number, larger.number, nan),
-        *(_speed_difference(smaller, larger, scene, n) for n in orders),
     ]
+    if smaller.folds is not None and larger.folds is not None:
+        found += [_jump_difference(smaller, larger, scene, above) for above in (False, True)]
+    return found
 
 
-def _speed_difference(smaller: ModelAnswer, larger: ModelAnswer, scene: Scene, n: int) -> Difference:
-    """One critical speed by two models; two that do not exist agree, one that is not known agrees with nothing."""
-    (a, code_a), (b, code_b) = smaller.speeds.at(n), larger.speeds.at(n)
+def _nearest(folds: Folds, gamma: float, above: bool) -> tuple[float, int]:
+    """The jump next to a speed, and a status: NOT_FOUND where there is none between the speeds looked at."""
+    if not folds.complete:
+        return nan, status.NOT_CONVERGED
+    beyond = folds.gamma[folds.gamma > gamma] if above else folds.gamma[folds.gamma <= gamma]
+    if not len(beyond):
+        return nan, status.NOT_FOUND
+    return float(beyond.min() if above else beyond.max()), status.OK
+
+
+def _jump_difference(smaller: ModelAnswer, larger: ModelAnswer, scene: Scene, above: bool) -> Difference:
+    """The jump next to the speed by two models; two that do not exist agree, one that is not known with nothing."""
+    assert smaller.folds is not None
+    assert larger.folds is not None
+    (a, code_a), (b, code_b) = (_nearest(answer.folds, scene.gamma, above) for answer in (smaller, larger))
     known = code_a == code_b == status.OK
     relative = abs(a / b - 1.0) if known else nan
     return Difference(
         smaller=smaller.model,
         larger=larger.model,
         question="speeds",
-        quantity=f"critical speed {n}",
+        quantity=f"jump {'above' if above else 'below'}",
         unit="m/s",
         by_smaller=scene.speed_of(a),
         by_larger=scene.speed_of(b),
         relative=relative,
-        agrees=relative <= scene.tolerance if known else code_a in ABSENT and code_b in ABSENT,
+        agrees=relative <= scene.tolerance if known else code_a == code_b == status.NOT_FOUND,
         status_smaller=code_a,
         status_larger=code_b,
     )
@@ -241,8 +254,8 @@ def least_model(
     scene: Scene,
     model: str | None = None,
     asked: Sequence[str] = QUESTIONS,
-    vacuum: PairSpeeds | None = None,
-    compared: Sequence[int] = (),
+    looked: tuple[float, float] | None = None,
+    vacuum: Folds | None = None,
 ) -> Choice:
     """The least model whose answers to what is asked are those of all larger ones within the scene's tolerance.
 
@@ -254,10 +267,10 @@ def least_model(
         The model to use whatever the others say; they are not solved.
     asked : sequence of str
         Some of QUESTIONS.
-    vacuum : PairSpeeds, optional
-        The pairs whose critical speeds are asked for, by the vacuum model; none by default.
-    compared : sequence of int
-        Those of their numbers that are compared.
+    looked : (float, float), optional
+        Speeds between which jumps are looked for [-]; without it none are.
+    vacuum : Folds, optional
+        Those of the vacuum model, if they are known.
 
     Returns
     -------
@@ -276,16 +289,15 @@ def least_model(
     if missing:
         raise ValueError(f"the {known[-1]} model needs {', '.join(missing)}, for which keys of the scene are missing")
     if "speeds" not in asked:
-        vacuum, compared = None, ()
-    answers = [_solved(scene, name, vacuum, len(known) > 1) for name in known]
-    return choose(scene, answers, asked, compared, model is not None, untried)
+        looked = None
+    answers = [_solved(scene, name, looked, vacuum, len(known) > 1) for name in known]
+    return choose(scene, answers, asked, model is not None, untried)
 
 
 def choose(
     scene: Scene,
     answers: Sequence[ModelAnswer],
     asked: Sequence[str],
-    compared: Sequence[int] = (),
     forced: bool = False,
     untried: Sequence[str] = (),
 ) -> Choice:
@@ -298,8 +310,6 @@ def choose(
         Of models in rising order.
     asked : sequence of str
         Some of QUESTIONS.
-    compared : sequence of int
-        Numbers of the pairs whose critical speeds are compared.
     forced : bool
         Whether the model was named.
     untried : sequence of str
@@ -313,7 +323,7 @@ def choose(
         difference
         for place, smaller in enumerate(answers)
         for larger in answers[place + 1 :]
-        for difference in compare(smaller, larger, scene, compared)
+        for difference in compare(smaller, larger, scene)
         if difference.question in asked
     ]
     unlike = {difference.smaller for difference in differences if not difference.agrees}
@@ -328,9 +338,13 @@ def choose(
     )
 
 
-def _solved(scene: Scene, model: str, vacuum: PairSpeeds | None, compared: bool) -> ModelAnswer:
+def _solved(
+    scene: Scene, model: str, looked: tuple[float, float] | None, vacuum: Folds | None, compared: bool
+) -> ModelAnswer:
     try:
-        return solve_model(scene, model, vacuum)
+        return solve_model(scene, model, looked, vacuum)
+    except TooMuchWork:
+        raise
     except (ValueError, ArithmeticError) as error:
         hint = "; a smaller one named by --model answers without it" if compared and model != "vacuum" else ""
         raise type(error)(f"the {model} model has no answer: {error}{hint}") from None

@@ -12,7 +12,6 @@ from towatlas.limits import transitions
 from towatlas.results import Equilibria
 from towatlas.scene.choice import Choice, least_model
 from towatlas.scene.models import QUESTIONS
-from towatlas.scene.pairs import PairSpeeds
 from towatlas.scene.scene import Scene, patient_with
 from towatlas.solve.critical import SECONDS_A_HALF_WAVE, solve_critical
 from towatlas.solve.members import REMEDY
@@ -22,6 +21,8 @@ from towatlas.tables.critical import CriticalTable
 
 # A jump is near where its speed is within this share of the scene's.
 NEAR = 0.1
+# Jumps with drag are looked for between these shares of the speed.
+LOOKED = (1.0 / 30.0, 2.0)
 # Transitions listed at least, and asked for at a time.
 BLOCK = 6
 
@@ -220,14 +221,6 @@ def answer_scene(
 def _answer(scene: Scene, atlas: Atlas | None, model: str | None, asked: Sequence[str]) -> SceneAnswer:
     groups, gamma = scene.system("vacuum"), scene.gamma
     jumps = critical_speeds(lam=groups.lam, w_f=groups.w_f, gamma=gamma, atlas=atlas)
-    passed = jumps.passed(gamma)
-    # The pairs that decide where the cable jumps, as it slows down and speeds up; one more should the second be gone.
-    there = (jumps.n >= passed) & (jumps.n <= passed + 2)
-    choice = least_model(
-        scene,
-        model,
-        asked,
-        vacuum=PairSpeeds.of_vacuum(jumps.n[there], jumps.gamma[there], jumps.status[there]),
-        compared=[n for n in (passed, passed + 1) if n in jumps.n],
-    )
+    looked = (gamma * LOOKED[0], gamma * LOOKED[1])
+    choice = least_model(scene, model, asked, looked)
     return SceneAnswer(scene=scene, jumps=jumps, choice=choice)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from towatlas.results import Equilibria
-from towatlas.scene.pairs import PairSpeeds, pair_speeds
+from towatlas.results import Equilibria, Folds
 from towatlas.scene.scene import MODELS, Scene, check_model
 from towatlas.solve.equilibria import solve_equilibria
+from towatlas.solve.folds import folds_in_speed
 from towatlas.system import System
 
 # What may be asked about a scene. Critical speeds go with the number of equilibria, which tells folds passed.
@@ -36,8 +36,8 @@ class ModelAnswer:
         x, y, z of the fish [m]; the tow point is at (R, 0, 0), z points down from it.
     tension : float
         At the tow point [N], > 0.
-    speeds : PairSpeeds
-        Of the pairs asked for, dimensionless.
+    folds : Folds or None
+        Jumps between the speeds looked at, dimensionless; None where none were asked for.
     """
 
     model: str
@@ -46,7 +46,7 @@ class ModelAnswer:
     nodes: int
     position: Array
     tension: float
-    speeds: PairSpeeds
+    folds: Folds | None
 
     @property
     def number(self) -> int:
@@ -96,7 +96,9 @@ def solvable_models(scene: Scene) -> tuple[list[str], list[str]]:
     return known, [model for model in MODELS if model not in known]
 
 
-def solve_model(scene: Scene, model: str, vacuum: PairSpeeds | None = None) -> ModelAnswer:
+def solve_model(
+    scene: Scene, model: str, looked: tuple[float, float] | None = None, vacuum: Folds | None = None
+) -> ModelAnswer:
     """What one model answers about a scene.
 
     Parameters
@@ -104,8 +106,10 @@ def solve_model(scene: Scene, model: str, vacuum: PairSpeeds | None = None) -> M
     scene : Scene
     model : str
         One of MODELS.
-    vacuum : PairSpeeds, optional
-        The pairs whose critical speeds are asked for, by the vacuum model; none by default.
+    looked : (float, float), optional
+        Speeds between which jumps are looked for [-]; without it none are.
+    vacuum : Folds, optional
+        Those of the vacuum model, if they are known.
 
     Returns
     -------
@@ -114,7 +118,7 @@ def solve_model(scene: Scene, model: str, vacuum: PairSpeeds | None = None) -> M
     Raises
     ------
     ValueError
-        If this model has no such cable, as one that floats without a fish.
+        If this model has no such cable, as one that nothing holds down or up.
     ArithmeticError
         If the computation overflows or does not converge.
     """
@@ -124,7 +128,10 @@ def solve_model(scene: Scene, model: str, vacuum: PairSpeeds | None = None) -> M
     k = found.expected
     if k < 0:
         raise ArithmeticError(f"no equilibrium was found, or none that is to be expected; searched: {found.searched}")
-    pairs = PairSpeeds.of_vacuum() if vacuum is None else vacuum
+    jumps = None
+    if looked is not None:
+        # A fluid without drag and buoyancy is a vacuum.
+        jumps = vacuum if system.in_vacuum and vacuum is not None else folds_in_speed(system, *looked)
     return ModelAnswer(
         model=model,
         system=system,
@@ -132,6 +139,5 @@ def solve_model(scene: Scene, model: str, vacuum: PairSpeeds | None = None) -> M
         nodes=int(found.nodes[k]),
         position=np.array([found.x_f[k], found.y_f[k], found.z_f[k]]) * scene.radius,
         tension=float(found.tension[k]) * scene.force_unit(model),
-        # A fluid without drag and buoyancy is a vacuum.
-        speeds=pairs if system.in_vacuum else pair_speeds(system, pairs.n),
+        folds=jumps,
     )

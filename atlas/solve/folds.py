@@ -31,7 +31,7 @@ from towatlas.system import System
 
 Booleans = NDArray[np.bool_]
 # Columns at first, in the logarithm of what moves; two so near that they are not halved again.
-SPACING, FEWEST, NEAREST = 0.06, 9, 1e-10
+SPACING, FEWEST, NEAREST = 0.12, 9, 1e-10
 ROUNDS = 48
 # How far a shape may be from where the slopes at both columns have it, over the way to the next shape.
 ASTRAY = 0.1
@@ -42,8 +42,8 @@ FOLD_ROUNDS, LONGEST, SETTLED = 24, 1.0, 1e-11
 ROUNDINGS = 64.0
 # The way to the vacuum: so little of the fluid is none; speeds and fluids at which it is given up.
 FAINT = 1e-6
-SLOWEST, FASTEST, DENSEST = 1e-5, 1e3, 1e3
-STEPS = Steps(first=2.0, longest=2.0, shortest=1e-4)
+SLOWEST, FASTEST, DENSEST = 1e-5, 1e3, 30.0
+STEPS = Steps(first=2.0, longest=2.0, shortest=1e-2)
 
 
 @dataclass(frozen=True)
@@ -366,14 +366,34 @@ def folds(
     if ends.shape != (2,) or not np.isfinite(ends).all() or not ends[0] < ends[1] or not ends[0] * ends[1] > 0.0:
         raise ValueError(f"{name} must be two finite numbers of one sign, low < high, got {given[name]!r}")
     numbers = {key: float(array) if key != name else float(ends[0]) for key, array in arrays.items()}
-    speed = check_speed(numbers.pop("gamma"))
     low, high = sorted(np.abs(ends))
+    speed = check_speed(numbers.pop("gamma"))
+    if name == "gamma":
+        speed = float(np.copysign(low, speed))
     system = System.of(**numbers, m_f=m_f, w=w, C_s=C_s, b_s=b_s)
     moved = ("w_f", "m_f") if name == "w_f" and m_f is None else (name,)
     with patience():
-        if name == "gamma" and system.in_vacuum:
-            return _in_vacuum(system, float(low), float(high), np.sign(speed))
+        if name == "gamma":
+            return folds_in_speed(system, speed, float(np.copysign(high, speed)))
         return solve_folds_between(system, speed, moved, high / low)
+
+
+def folds_in_speed(system: System, low: float, high: float) -> Folds:
+    """Folds of a system between two speeds; no checks.
+
+    Parameters
+    ----------
+    system : System
+    low, high : float
+        [-], of one sign, the slower first.
+
+    Returns
+    -------
+    Folds
+    """
+    if system.in_vacuum:
+        return _in_vacuum(system, abs(low), abs(high), np.sign(low))
+    return solve_folds_between(system, low, ("gamma",), high / low)
 
 
 def solve_folds_between(system: System, gamma: float, moved: tuple[str, ...], factor: float) -> Folds:
@@ -403,11 +423,9 @@ def solve_folds_between(system: System, gamma: float, moved: tuple[str, ...], fa
     first = gamma if by_speed else getattr(system, moved[0])
     name = moved[0]
     searched = (
-        f"{name} {first:.6g} to {first * factor:.6g}, all shapes at {columns} values of it, at most {SPACING:g} apart in "
-        "its logarithm and closer until the shapes of neighbours were each other's"
-    )
-    searched += (
-        "; that there are no others is not proved" if certain else "; not everywhere made out: some may be missing"
+        f"{name} {first:.6g} to {first * factor:.6g}, all shapes at {columns} values of it, at most {SPACING:g} apart "
+        "in its logarithm and closer until the shapes of neighbours were each other's; "
+        + ("that there are no others is not proved" if certain else "not everywhere made out: some may be missing")
     )
     return Folds(
         system=system,

@@ -1,4 +1,4 @@
-"""Kinds of jets for the kernels of towatlas.kernels.series: which monomials, and which products give which."""
+"""Kinds of jets for the kernels of towatlas.kernels.drag: which monomials, and which products give which."""
 
 from dataclasses import dataclass
 
@@ -19,19 +19,27 @@ class Jets:
         Exponents, lower degrees first.
     products : ndarray of int, shape (products, 3)
         The factors and the result, sorted by the result, with the constant times the result itself last of its kind.
+    pairs : ndarray of int, shape (pairs, 3)
+        The same with each two factors once.
     places : ndarray of int, shape (5,)
-        The monomials r, r^2, r^3, gamma and C, 0 where there is none.
+        The monomials r, r^2, r^3, gamma and the parameter, 0 where there is none.
     degree : int
         Highest power of log r, >= 0.
     """
 
     monomials: tuple[Monomial, ...]
     products: NDArray[np.int64]
+    pairs: NDArray[np.int64]
     places: NDArray[np.int64]
     degree: int
 
     def __len__(self) -> int:
         return len(self.monomials)
+
+    @property
+    def algebra(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], int]:
+        """What the kernels take."""
+        return self.products, self.pairs, self.places, self.degree
 
     def at(self, *monomial: int) -> int:
         """Index of a monomial.
@@ -86,4 +94,6 @@ def jets_of(degree: int, gamma: bool = False, parameter: bool = False) -> Jets:
                 products.append((i, j, at[total]))  # type: ignore[index]
     products.sort(key=lambda product: (product[2], -product[0]))
     places = [at.get(m, 0) for m in ((1, 0, 0), (2, 0, 0), (3, 0, 0), (0, 1, 0), (0, 0, 1))]
-    return Jets(tuple(monomials), np.array(products, np.int64), np.array(places, np.int64), degree)
+    every = np.array(products, np.int64)
+    once = np.ascontiguousarray(every[every[:, 0] <= every[:, 1]])
+    return Jets(tuple(monomials), every, once, np.array(places, np.int64), degree)

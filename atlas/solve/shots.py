@@ -16,7 +16,7 @@ Integers = NDArray[np.int64]
 MAX_STEPS = 10**5
 # Shots between two looks at the clock: all of the longest, some seconds.
 BATCH = 256
-REMEDY = "long cables, high speeds and strong drag make shots long"
+REMEDY = "a shorter cable, a lower speed or less drag makes shots shorter"
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def shoot(
         rows_of[upward != port, C_S] *= -1.0
     state, steps = np.empty((rows, RESULT_ROWS, len(jets))), np.empty(rows, np.int64)
     turns, codes = np.empty((rows, 2), np.int64), np.empty(rows, np.int64)
-    shots, algebra = Shots(r, np.square(speed), table, moved, part), Algebra(jets.products, jets.places, jets.degree)
+    shots, algebra = Shots(r, np.square(speed), table, moved, part), Algebra(*jets.algebra)
     reached = Reached(state, steps, turns, codes)
     for begin in range(0, rows, BATCH):
         check_patience("shots with drag", REMEDY)

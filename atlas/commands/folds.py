@@ -1,0 +1,77 @@
+"""`towatlas folds`: every jump of one cable as its speed rises."""
+
+import argparse
+import math
+from typing import Any
+
+from towatlas.commands.common import FAILED, OK, add_cable, add_fluid, add_patience, fluid, print_json, real, say
+from towatlas.kernels import status
+from towatlas.results import Folds
+from towatlas.solve.folds import folds
+
+
+def add(commands: Any) -> None:
+    """Declare the command."""
+    parser = commands.add_parser(
+        "folds",
+        help="every jump of one cable between two speeds, in any medium",
+        description="Speeds between two at which the number of shapes changes by two, in rising order, wherever they "
+        "come from: n is the number of the transition of the vacuum from which one is continued, none for those that "
+        "drag makes. `towatlas critical` lists those of the vacuum.",
+    )
+    add_cable(parser, gamma=False, any_medium=True)
+    parser.add_argument(
+        "--gamma",
+        type=_span,
+        required=True,
+        metavar="LOW:HIGH",
+        help="from which speed to which, Omega sqrt(R/g); both negative for a turn to port, as --gamma=-5:-1",
+    )
+    add_fluid(parser)
+    add_patience(parser)
+    parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
+    parser.set_defaults(run=_run)
+
+
+def _span(text: str) -> tuple[float, float]:
+    try:
+        low, high = (float(part) for part in text.split(":"))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not two numbers, as 0.5:6") from None
+    if not (math.isfinite(low) and math.isfinite(high) and low < high and low * high > 0.0):
+        raise argparse.ArgumentTypeError(f"{text!r}: two finite speeds of one sign, the lower first")
+    return low, high
+
+
+def _run(options: argparse.Namespace) -> int:
+    found = folds(options.lam, options.wf, options.gamma, **fluid(options))
+    rows = [_row(found, k) for k in range(len(found))]
+    if options.json:
+        print_json(rows)
+    else:
+        _print_table(rows)
+    say(f"looked at: {found.searched}")
+    return OK if found.complete else FAILED
+
+
+def _row(found: Folds, k: int) -> dict[str, Any]:
+    return {
+        "gamma": float(found.gamma[k]),
+        "r_f": float(found.r_f[k]),
+        "shapes_below": int(found.shapes_below[k]),
+        "shapes_above": int(found.shapes_above[k]),
+        "n": int(found.n[k]) or None,
+        "origin": str(found.origin[k]),
+        "error": real(found.error[k]),
+        "status": status.FLAG_MEANINGS.split()[int(found.status[k])],
+    }
+
+
+def _print_table(rows: list[dict[str, Any]]) -> None:
+    print(f"{'gamma':>20} {'r_f':>20} {'shapes':>9} {'n':>5} {'origin':>7} {'error':>8}")
+    for row in rows:
+        shapes = f"{row['shapes_below']} to {row['shapes_above']}"
+        print(
+            f"{row['gamma']:>20.13g} {row['r_f']:>20.13g} {shapes:>9} {row['n'] or '-':>5} {row['origin']:>7} "
+            f"{row['error']:>8.1e}"
+        )
