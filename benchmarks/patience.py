@@ -148,6 +148,8 @@ def fluid(rng: Rng, medium: str) -> list[str]:
         numbers["C-t"] = wide(rng, 0.01)
     if medium == "water":
         numbers |= {"w": float(rng.uniform(-1.0, 1.0)), "m-f": wide(rng)}
+    if rng.random() < 0.1:
+        numbers |= {"C-s": float(rng.choice([-1.0, 1.0])) * wide(rng, 0.1), "b-s": wide(rng, 0.1, 4.0)}
     return [f"--{name}={value:.6g}" for name, value in numbers.items()]
 
 
@@ -160,6 +162,16 @@ def _critical(rng: Rng, medium: str) -> list[str]:
 
 def _equilibria(rng: Rng, medium: str) -> list[str]:
     return ["equilibria", *cable(rng), *fluid(rng, medium)]
+
+
+def _folds(rng: Rng, medium: str) -> list[str]:
+    low = wide(rng)
+    return [
+        "folds",
+        *cable(rng, gamma=False),
+        f"--gamma={low:.6g}:{low * 10.0 ** rng.uniform(0, 3):.6g}",
+        *fluid(rng, medium),
+    ]
 
 
 def _shape(rng: Rng, medium: str) -> list[str]:
@@ -192,6 +204,7 @@ def _speed(rng: Rng) -> list[str]:
 COMMANDS: dict[str, Callable[[Rng, str], list[str]]] = {
     "critical": _critical,
     "equilibria": _equilibria,
+    "folds": _folds,
     "shape": _shape,
     "fish": _fish,
     "scene": _scene,
@@ -267,6 +280,7 @@ def work(folder: Path, limit: float) -> None:
         ["critical", "--lam=500", "--wf=1", "--solve"],
         ["equilibria", "--lam=5", "--wf=1", "--gamma=1", "--C=0.1"],
         ["critical", "--lam=5", "--wf=1", "--solve", "--C=0.1"],
+        ["folds", "--lam=5", "--wf=1", "--gamma=1:2", "--C=0.1"],
     ):
         run_case(Case(0, "", arguments, ""), folder)
     for line in sys.stdin:

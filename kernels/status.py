@@ -26,7 +26,7 @@ SENTENCES = {
     BAD_INPUT: "an input is not finite, not positive (lambda), negative (w_f), or so large or small that it overflows",
     LOST_IN_ROUNDING: "lambda is so close to lambda_cn that rounding leaves fewer than four digits of the answer",
     NEAR_FOLD: "too close to a fold to interpolate; ask for the direct solver",
-    NO_PAIR: "too much drag: the pair never appears",
+    NO_PAIR: "too much drag: the n-th pair of the vacuum never appears; drag may make others, see towatlas folds",
     NEVER_ENDS: "the pair does not end up to the highest speed looked at",
     NO_CUSP: "no cusp: as the drag rises, the pair appears at ever higher speed, up to the highest looked at",
 }

@@ -14,15 +14,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from towatlas.checks import check_broadcast, check_order, check_positive_finite, check_real
+from towatlas.effort import patience
 from towatlas.kernels import status
 from towatlas.limits import unchecked_excess_length
 from towatlas.numerics.curves import Curve, Steps, follow
 from towatlas.numerics.rows import EPS, newton, solve_systems
 from towatlas.results import DragFolds
 from towatlas.solve.critical import solve_rows
+from towatlas.solve.folds import folds_in_speed
 from towatlas.solve.jets import jets_of
 from towatlas.solve.shots import Array, Integers, direction_of, shoot
-from towatlas.system import nondense_rows
+from towatlas.system import System, nondense_rows
 
 FOLD = jets_of(2, gamma=True, parameter=True)
 AT_DRAG = jets_of(2, gamma=True)
@@ -31,6 +33,8 @@ CUSP = jets_of(3, gamma=True, parameter=True)
 # The number that the parameter moves, by its logarithm.
 DRAG = ("C",)
 GAMMA_MAX = 50.0
+# Drag moves the speed of a pair down to no less than this share of that in a vacuum, as far as was seen.
+SLOWER = 0.2
 # Drag so small that the vacuum's fold is a first guess of it.
 FAINT = 1e-6
 # Along a curve, in the arclength of (log r, log gamma, log C).
@@ -279,8 +283,8 @@ def solve_drag_folds(lam: ArrayLike, w_f: ArrayLike, C: ArrayLike, n: ArrayLike 
     Notes
     -----
     At a fold log rho = 0, rho the radius at the tow point over the tow radius, and its slope in log r_f is 0; at the
-    cusp its second slope, too. Continued from the n-th fold of the vacuum: folds that are not connected with one, if
-    there are any, are not found.
+    cusp its second slope, too. Continued from the n-th fold of the vacuum; folds that drag makes are not among these,
+    but in `folds`.
 
     References
     ----------
@@ -290,7 +294,7 @@ def solve_drag_folds(lam: ArrayLike, w_f: ArrayLike, C: ArrayLike, n: ArrayLike 
     --------
     >>> folds = solve_drag_folds(37.8, 1352, [0.005, 0.018], n=2)
     >>> folds.sentence(1)
-    'too much drag: the pair never appears'
+    'too much drag: the n-th pair of the vacuum never appears; drag may make others, see towatlas folds'
     """
     arrays = {"lam": check_real("lam", lam), "w_f": check_real("w_f", w_f), "C": check_real("C", C)}
     check_positive_finite("lam", arrays["lam"])
@@ -299,13 +303,14 @@ def solve_drag_folds(lam: ArrayLike, w_f: ArrayLike, C: ArrayLike, n: ArrayLike 
     lam, w_f, C, n = check_broadcast(**arrays, n=check_order(n))
     flat = [np.ascontiguousarray(column.ravel()) for column in (n, lam, w_f)]
     cables, which = np.unique(np.stack(flat, axis=1), axis=0, return_inverse=True)
-    table = _fold_rows(
-        lam=cables[:, 1].copy(),
-        w_f=cables[:, 2].copy(),
-        n=cables[:, 0].astype(np.int64),
-        which=which.ravel(),
-        c=C.ravel(),
-    )
+    with patience():
+        table = _fold_rows(
+            lam=cables[:, 1].copy(),
+            w_f=cables[:, 2].copy(),
+            n=cables[:, 0].astype(np.int64),
+            which=which.ravel(),
+            c=C.ravel(),
+        )
     shaped = {name: column.reshape(n.shape) for name, column in table.items()}
     return DragFolds(n=n, lam=lam, w_f=w_f, C=C, **shaped)
 
@@ -315,7 +320,7 @@ def _fold_rows(*, lam: Array, w_f: Array, n: Integers, which: Integers, c: Array
     curves, traced = trace_folds(lam=lam, w_f=w_f, n=n)
     cusps, cusp_codes = solve_cusps(curves, traced, lam=lam, w_f=w_f)
     cusp_error = cusp_errors(cusps, lam=lam, w_f=w_f)
-    lasting = np.array([curve.points[-1, 2] if len(curve) else np.nan for curve in curves])
+    lasting = np.array([curve.points[-1, 2] if len(curve) and curve.complete else np.nan for curve in curves])
     vacuum = solve_rows(lam=lam, w_f=w_f, n=n, excess=unchecked_excess_length(lam=lam, w_f=w_f, n=n))
     with np.errstate(divide="ignore"):
         log_c = np.log(c)
@@ -344,7 +349,7 @@ def _fold_rows(*, lam: Array, w_f: Array, n: Integers, which: Integers, c: Array
     for column, name in ((appears, "gamma"), (r_f, "x_f"), (error, "error")):
         column[still] = np.abs(vacuum[name][which])[still]
     codes[still] = status.OK
-    return {
+    table = {
         "appears": appears,
         "r_f_appears": r_f,
         "ends": sides[False][0],
@@ -358,3 +363,26 @@ def _fold_rows(*, lam: Array, w_f: Array, n: Integers, which: Integers, c: Array
         "status_ends": np.where(still, status.NEVER_ENDS, sides[False][3]).astype(np.int8),
         "status_cusp": cusp_codes[which].astype(np.int8),
     }
+    lost = (table["status"] == status.NOT_CONVERGED) | (table["status_ends"] == status.NOT_CONVERGED)
+    for row in np.flatnonzero(lost & (vacuum["status"][which] == status.OK)):
+        cable = which[row]
+        _look(table, int(row), systems[row], int(n[cable]), float(vacuum["gamma"][cable]))
+    return table
+
+
+def _look(table: dict[str, NDArray[Any]], row: int, system: Array, n: int, gamma: float) -> None:
+    """Put in the pair of a system whose curve of folds could not be followed, from all its folds in speed."""
+    found = folds_in_speed(System(*system.tolist()), SLOWER * gamma, GAMMA_MAX)
+    if not found.complete:
+        return
+    for name, wanted, rises in (("appears", "", True), ("ends", "_ends", False)):
+        of_pair = np.flatnonzero((found.n == n) & ((found.shapes_above > found.shapes_below) == rises))
+        there = len(of_pair) > 0
+        k = of_pair[0 if rises else -1] if there else 0
+        table[name][row] = found.gamma[k] if there else np.nan
+        table[f"r_f_{name}"][row] = found.r_f[k] if there else np.nan
+        table[f"status{wanted}"][row] = status.OK if there else status.NO_PAIR if rises else status.NEVER_ENDS
+        if there:
+            table["error"][row] = np.fmax(table["error"][row], found.error[k])
+    if table["status"][row] == status.NO_PAIR:
+        table["status_ends"][row] = status.NO_PAIR

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from towatlas.checks import check_real, check_root, check_speed
+from towatlas.effort import patience
 from towatlas.kernels import status
 from towatlas.numerics.rows import bracket
 from towatlas.results import Equilibria
@@ -95,8 +96,8 @@ def shape(
     [1.0, 0.335709, -1.703467]
     """
     system = System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t, C_s=C_s, b_s=b_s)
-    found = solve_equilibria(system, check_speed(gamma))
-    return shape_of(found, root, s)
+    with patience():
+        return shape_of(solve_equilibria(system, check_speed(gamma)), root, s)
 
 
 def shape_of(found: Equilibria, root: str | int = "expected", s: ArrayLike | None = None) -> "xarray.Dataset":
@@ -137,12 +138,13 @@ def shape_of(found: Equilibria, root: str | int = "expected", s: ArrayLike | Non
     arc = np.linspace(0.0, lam, POINTS) if s is None else np.atleast_1d(check_real("s", s))
     if arc.ndim != 1 or not ((arc >= 0.0) & (arc <= lam)).all():
         raise ValueError(f"s must be a list of arc lengths from 0 to lam = {lam:.15g}")
-    line = _vacuum_line(found, k) if found.system.in_vacuum else _drag_line(found, k)
-    s_node = np.sort(lam - _node_heights(found, k, line))
-    # The tow point before all others: depths are below it.
-    columns = line(lam - np.concatenate([[0.0], arc, s_node]))
-    columns[2] = columns[2, 0] - columns[2]
-    return _dataset(found, k, arc, columns[:, 1 : 1 + len(arc)], s_node, columns[2, 1 + len(arc) :])
+    with patience():
+        line = _vacuum_line(found, k) if found.system.in_vacuum else _drag_line(found, k)
+        s_node = np.sort(lam - _node_heights(found, k, line))
+        # The tow point before all others: depths are below it.
+        columns = line(lam - np.concatenate([[0.0], arc, s_node]))
+        columns[2] = columns[2, 0] - columns[2]
+        return _dataset(found, k, arc, columns[:, 1 : 1 + len(arc)], s_node, columns[2, 1 + len(arc) :])
 
 
 def _vacuum_line(found: Equilibria, k: int) -> Line:
