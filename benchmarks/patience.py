@@ -332,6 +332,15 @@ def write(runs: list[Run], path: Path) -> None:
     path.write_bytes(gzip.compress(text.getvalue().encode(), mtime=0))
 
 
+def read(path: Path) -> list[Run]:
+    """What `write` wrote; nothing where there is no file."""
+    if not path.exists():
+        return []
+    rows = csv.DictReader(io.StringIO(gzip.decompress(path.read_bytes()).decode()))
+    kinds = {"number": int, "exit": int, "seconds": float}
+    return [Run(**{name: kinds.get(name, str)(text) for name, text in row.items()}) for row in rows]
+
+
 def summary(runs: list[Run]) -> str:
     """How many ended how, with the longest time, and the slowest."""
     groups: dict[tuple[str, str, int], list[float]] = defaultdict(list)
@@ -353,6 +362,7 @@ def summary(runs: list[Run]) -> str:
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=5000)
+    parser.add_argument("--first", type=int, default=0, help="go on from this number; rows before it are kept")
     parser.add_argument("--seed", type=int, default=2026)
     parser.add_argument("--media", nargs="+", choices=MEDIA, default=MEDIA)
     parser.add_argument("--patience", type=float, default=SECONDS, help="of each command, s")
@@ -364,8 +374,9 @@ def main(arguments: list[str] | None = None) -> int:
     if options.work:
         work(options.work, limit)
         return 0
-    runs = []
-    for run in run_all(cases(options.count, options.seed, options.media, options.patience), limit):
+    runs = read(options.out)[: options.first]
+    some = cases(options.count, options.seed, options.media, options.patience)[len(runs) :]
+    for run in run_all(some, limit):
         runs.append(run)
         if len(runs) % 100 == 0:
             write(runs, options.out)

@@ -339,7 +339,7 @@ def _fold_rows(*, lam: Array, w_f: Array, n: Integers, which: Integers, c: Array
                 guess[row], codes[row] = found[:2], status.OK
             elif not before and cusp_code == status.NO_CUSP:
                 codes[row] = status.NEVER_ENDS if log_c[row] < curve.points[-1, 2] else status.NO_PAIR
-            elif not before and not curve.complete:
+            elif not curve.complete if not before else np.isfinite(log_c[row]):
                 codes[row] = status.NOT_CONVERGED
         z, error, solved = fold_at(guess, systems)
         tried = np.isfinite(guess).all(axis=1)

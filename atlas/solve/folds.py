@@ -33,8 +33,8 @@ Booleans = NDArray[np.bool_]
 # Columns at first, in the logarithm of what moves; two so near that they are not halved again.
 SPACING, FEWEST, NEAREST = 0.12, 9, 1e-10
 ROUNDS = 48
-# How far a shape may be from where the slopes at both columns have it, over the way to the next shape.
-ASTRAY = 0.1
+# How far a shape may be from where the slopes at both columns have it: over the way to the next shape, and in x.
+ASTRAY, ASTRAY_IN_X = 0.1, 0.01
 # Extrema of log rho so near to zero are watched; which part of the way to the next column one may be from reaching it.
 WATCHED, REACHES = 0.5, 0.6
 # Newton's method for a fold.
@@ -135,11 +135,14 @@ class Path:
 
 @dataclass(frozen=True)
 class _Column:
-    """All shapes at one t: x of each and how it moves with t; extrema near zero, their height and how that moves."""
+    """All shapes at one t: x of each, how it moves with t, the slope of log rho there and how that moves; extrema near
+    zero, their height and how that moves."""
 
     t: float
     x: Array
     moves: Array
+    slopes: Array
+    bends: Array
     peaks: Array
     heights: Array
     rises: Array
@@ -159,10 +162,11 @@ def _columns(path: Path, t: Array) -> list[_Column]:
     near = np.abs(found.peaks[:, 2]) < WATCHED
     peak_row, peak = found.peaks[near, 0].astype(np.int64), found.peaks[near, 1]
     every = np.concatenate([found.row, peak_row])
-    along, across, _ = path.log_rho(np.concatenate([found.x, peak]), t[every], 1)
+    along, across, _ = path.log_rho(np.concatenate([found.x, peak]), t[every], 2)
     count = len(found.x)
     with np.errstate(divide="ignore", invalid="ignore"):
         moves = -across[:count, 0] / along[:count, 1]
+        bends = along[:count, 2] * moves + across[:count, 1]
     columns = []
     for k in range(len(t)):
         here, there = found.row == k, peak_row == k
@@ -171,6 +175,8 @@ def _columns(path: Path, t: Array) -> list[_Column]:
                 float(t[k]),
                 found.x[here],
                 moves[here],
+                along[:count, 1][here],
+                bends[here],
                 peak[there],
                 along[count:, 0][there],
                 across[count:, 0][there],
@@ -193,13 +199,20 @@ def _goes_on(a: _Column, b: _Column, drop_a: int = -1, drop_b: int = -1) -> bool
         between = np.diff(column.x)
         nearest = np.fmin(np.append(between, inf), np.insert(between, 0, inf))
         gaps = np.fmin(gaps, nearest[keep])
-    return bool((apart <= ASTRAY * gaps).all())
+    return bool((apart <= np.fmin(ASTRAY * gaps, ASTRAY_IN_X)).all())
 
 
 def _about_to(column: _Column, step: float) -> bool:
-    """Whether an extremum of a column may reach the tow radius within a step."""
-    towards = column.heights * column.rises * step < 0.0
-    return bool((towards & (np.abs(column.heights) < REACHES * np.abs(column.rises * step))).any())
+    """Whether within a step an extremum of a column may reach the tow radius, or a shape be where two more begin.
+
+    Where the slope at a shape falls towards zero and rises again there is a cusp near by, with two folds on one side
+    of it, as close together as one likes.
+    """
+    reaches = column.heights * column.rises * step < 0.0
+    reaches &= np.abs(column.heights) < REACHES * np.abs(column.rises * step)
+    folds = column.slopes * column.bends * step < 0.0
+    folds &= np.abs(column.slopes) < np.abs(column.bends * step)
+    return bool(reaches.any() or folds.any())
 
 
 def _solve_folds(path: Path, x: Array, t: Array) -> tuple[Array, Array, Array, Booleans]:

@@ -26,6 +26,8 @@ PER_DECADE = 6
 HALVINGS = 40
 PREDICTED = 1e-3
 NEAR_FOLD = 0.01
+# The same where the radius rises by less than this a unit of x.
+FLAT, PREDICTED_FLAT = 0.05, 1e-9
 # How much of the width of an interval an error of the slope in its middle counts.
 SLOPE_SHARE = 0.25
 # Half an interval over which the tow point turns about the axis by more than this is halved again [rad].
@@ -184,10 +186,15 @@ class _Search:
             wrong = np.hypot(*(_between(a, b, width, 0.5) - new[:2]))
             wrong = np.maximum(wrong, SLOPE_SHARE * width * np.hypot(*(middle_slope - new[2:4])))
             line = _between(a[..., None], b[..., None], width[:, None], LOOKS)
-            nearest = np.abs(np.hypot(*line) - 1.0).min(axis=1)
+            away = np.hypot(*line) - 1.0
+            nearest = np.abs(away).min(axis=1)
+            # Next to a cusp three roots are where the radius hardly changes: the points must tell its smallest waves.
+            level = np.abs(np.diff(away, axis=1)) * (len(LOOKS) - 1) < FLAT * width[:, None]
+            flat = (level & (np.abs(away[:, 1:]) < NEAR_FOLD)).any(axis=1)
+            tolerance = np.where(flat, PREDICTED_FLAT, PREDICTED)
             # Far from the tow radius by more than twice what the cubic is wrong, or right. Beside a shot that failed
             # nothing is known, and nothing gained by more of them.
-            split = (wrong > PREDICTED) & (nearest < 2.0 * wrong)
+            split = (wrong > tolerance) & (nearest < np.maximum(2.0 * wrong, np.where(flat, NEAR_FOLD, 0.0)))
             # The angle about the axis counts nodes: where it changes more, waves may hide between the points.
             split |= np.maximum(np.abs(new[6] - a[6]), np.abs(new[6] - b[6])) > TURNED
             order = np.lexsort((np.concatenate([x, middle]), np.concatenate([rows, rows[i]])))
@@ -220,7 +227,7 @@ class _Search:
         """Points with those added that part pairs of roots: extrema on the other side of zero than both ends."""
         peak_row, peak, predicted, left = peaks
         at_left, at_right = values[4][left], values[4][left + 1]
-        hidden = (at_left * at_right > 0.0) & ((predicted * at_left < 0.0) | (np.abs(predicted) < NEAR_FOLD))
+        hidden = (at_left * at_right > 0.0) & (predicted * at_left < 0.0) | (np.abs(predicted) < NEAR_FOLD)
         i = np.flatnonzero(hidden)
         if not len(i):
             return rows, x, values[4]
