@@ -19,7 +19,7 @@ SHOTS_BLOCK = 256
 FOLDS_BLOCK = 128
 FORWARD_BLOCK = 1024
 # Shots with drag that a thread takes at a time.
-DRAG_BLOCK = 128
+DRAG_BLOCK = 64
 
 
 def _march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts, statuses):

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from towatlas.effort import check_foreseen
 from towatlas.kernels import status
 from towatlas.kernels.system import LAM
 from towatlas.numerics.hermite import cubic, cubic_coefficients
 from towatlas.numerics.rows import bracket
 from towatlas.solve.jets import jets_of
-from towatlas.solve.shots import Array, Integers, shoot
+from towatlas.solve.shots import REMEDY, Array, Integers, shoot
 
 Booleans = NDArray[np.bool_]
 SLOPE = jets_of(1)
@@ -42,6 +43,10 @@ BEYOND = 1.0 + 1e-9
 LOOKS = np.linspace(0.0, 1.0, 17)
 # Steps this small, in log r, are the last: the square of them is rounding.
 LAST_STEP = 1e-9
+# Where shots are made to foresee how long the others are, as shares of the range; and about how many those are, of
+# steps of so many seconds of CPU.
+PROBES = (0.2, 0.6, 0.9)
+EXPECTED_SHOTS, SECONDS_A_STEP = 100, 5e-7
 # Systems worked on at a time: their samples are what memory holds.
 BLOCK = 512
 
@@ -111,6 +116,7 @@ class _Search:
 
     def found(self) -> Found:
         low, high = self._range()
+        self._foresee(low, high)
         rows, x = self._first_points(low, high)
         rows, x, values = self._refined(rows, x)
         peaks = _peaks(rows, x, values)
@@ -160,6 +166,19 @@ class _Search:
         # What failed below the range that is searched does not matter.
         self.codes[:], self.unsearched[:] = status.OK, np.nan
         return low, high
+
+    def _foresee(self, low: Array, high: Array) -> None:
+        """Refuse at once what would take longer than there is patience for, by a few shots of each system."""
+        count = len(self.gamma)
+        rows = np.tile(np.arange(count), len(PROBES))
+        x = np.concatenate([low + share * (high - low) for share in PROBES])
+        ends = shoot(np.exp(x), self.gamma[rows], self.systems[rows], SLOPE)
+        steps = float(ends.steps.sum()) / len(PROBES)
+        check_foreseen(
+            steps * EXPECTED_SHOTS * SECONDS_A_STEP,
+            f"shots with drag of about {steps / max(1, count):,.0f} steps, some {EXPECTED_SHOTS * count:,} of them",
+            REMEDY,
+        )
 
     def _first_points(self, low: Array, high: Array) -> tuple[Integers, Array]:
         counts = np.ceil((high - low) / np.log(10.0) * PER_DECADE).astype(np.int64) + 1

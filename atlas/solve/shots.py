@@ -15,7 +15,7 @@ Integers = NDArray[np.int64]
 
 MAX_STEPS = 10**5
 # Shots between two looks at the clock: all of the longest, some seconds.
-BATCH = 256
+BATCH = 128
 REMEDY = "a shorter cable, a lower speed or less drag makes shots shorter"
 
 
