@@ -1,4 +1,4 @@
-"""Kinds of jets for the kernels of towatlas.kernels.series: which monomials, and which products give which."""
+"""Kinds of jets for the kernels with drag: which monomials, and which products give which."""
 
 from dataclasses import dataclass
 
