@@ -28,7 +28,7 @@ are, and which products give which, is data (`towatlas.solve.jets`): `jets` has 
 once. `kernels.drag_slopes` is the same for the jets that the search needs, written out.
 """
 
-from math import exp, log, sqrt
+from math import sqrt
 
 import numpy as np
 
@@ -59,7 +59,7 @@ TIP_REACH, TIP_REACH_SIDE = 1e-9, 1e-16
 FLOW_REACH = 1e-8
 # Error of the force, in units of that of the wave, at which a step has gone past the axis.
 PAST_AXIS = 1e-15
-LOG_TRUNCATION = log(TRUNCATION)
+LOG_TRUNCATION = np.log(TRUNCATION)
 
 # What a row of a program does at order k, jets all: columns are the operation, a, b, q, a number and the group of rows
 # that it is switched with. p is a parameter; PRODUCT q += n a b, AHEAD the same one order ahead, RATE q' += n a b,
@@ -363,9 +363,10 @@ def step_lengths(c, p, count, room, h):
     store(room, ZERO, last_but_one)
     store(room, FIRST, last)
     for lane in range(LANES):
-        by_one = (LOG_TRUNCATION - log(room[lane])) / (ORDER - 1.0)
-        by_other = (LOG_TRUNCATION - log(room[LANES + lane])) / ORDER
-        h[lane] = exp(min(by_one, by_other))
+        # numpy's functions, for the nothing in an idle lane: interpreted, those of the module math would raise.
+        by_one = (LOG_TRUNCATION - np.log(room[lane])) / (ORDER - 1.0)
+        by_other = (LOG_TRUNCATION - np.log(room[LANES + lane])) / ORDER
+        h[lane] = np.exp(min(by_one, by_other))
 
 
 @helper
@@ -541,6 +542,6 @@ def finish(c, p, jets, pairs, count):
         moved = load(p, SPEED2 * count + n) / speed2
         store(c, (E * count + n) * KEPT, 0.5 * (x - x2 / 2.0 + x3 / 3.0) - moved)
     for lane in range(LANES):
-        c[E * count * KEPT * LANES + lane] = 0.5 * log(c[RHO2 * count * KEPT * LANES + lane]) - log(
+        c[E * count * KEPT * LANES + lane] = 0.5 * np.log(c[RHO2 * count * KEPT * LANES + lane]) - np.log(
             p[SPEED2 * count * LANES + lane]
         )

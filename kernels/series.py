@@ -1,9 +1,9 @@
-"""Shots one at a time, by Taylor series in sigma with jets: the march written once for every set of equations.
+"""Shots one at a time, by Taylor series in sigma with jets: the march, for equations that are given.
 
 Every coefficient of the Taylor series in sigma is itself a short polynomial, a *jet*, in the unknowns of the problem:
 first and higher variations come out of the same recurrences as the solution, with no differences taken. A table of
-products says which pairs of monomials give which (`towatlas.solve.jets`); it is data, so one compiled kernel serves
-every kind of jet. Compiled in a tenth of the time of kernels.lanes, for who asks about few cables.
+products says which pairs of monomials give which. Compiled in a tenth of the time of kernels.lanes, for who asks about
+few cables.
 
 A set of equations is three functions, which `march_of` compiles the march with:
 
@@ -16,7 +16,7 @@ Jets are kept at fixed paid-out length: the step is a jet itself, whose higher c
 """
 
 from collections.abc import Callable
-from math import exp, log, sqrt
+from math import exp, log
 
 import numpy as np
 
@@ -26,84 +26,6 @@ from towatlas.kernels.steppers import ORDER, TRUNCATION
 
 U, T, FIRST = 0, 1, 2
 EPS = 2.0**-52
-
-
-# What a row of a program does with coefficient k of q, jets all: columns are the operation, a, b, q, an integer factor
-# and the group, whose rows are skipped where it is switched off.
-PRODUCT, RATE, RATIO, ROOT = range(4)  # q += factor a b;  q' += factor a b;  q = a / b;  q = sqrt(a)
-
-
-@helper
-def _add_product(c, a, b, k, first, last, factor, jets, q, at):
-    """Add factor times the terms first..last-1 of coefficient k of the product of a and b to that of q at `at`."""
-    for m in range(jets.shape[0]):
-        left, right = c[a, jets[m, 0]], c[b, jets[m, 1]]
-        total = 0.0
-        for order in range(np.uint64(first), np.uint64(last)):
-            total += left[order] * right[np.uint64(k) - np.uint64(order)]
-        c[q, jets[m, 2], at] += factor * total
-
-
-@helper
-def _divide(c, d, factor, jets, q, k):
-    """Divide coefficient k of q by `factor` times the leading coefficient of d, jets both."""
-    # Products come sorted by their result, the one that has it as a factor last.
-    for m in range(jets.shape[0]):
-        i, j, n = jets[m, 0], jets[m, 1], jets[m, 2]
-        if i != 0:
-            c[q, n, k] -= factor * c[d, i, 0] * c[q, j, k]
-        else:
-            c[q, n, k] /= factor * c[d, 0, 0]
-
-
-@helper
-def _root(c, q, jets):
-    """Replace the leading coefficient of q, a jet, by its square root."""
-    c[q, 0, 0] = sqrt(c[q, 0, 0])
-    for m in range(1, jets.shape[0]):
-        i, j, n = jets[m, 0], jets[m, 1], jets[m, 2]
-        if i == 0:
-            c[q, n, 0] /= 2.0 * c[q, 0, 0]
-        elif j != 0:
-            c[q, n, 0] -= c[q, i, 0] * c[q, j, 0]
-
-
-@helper
-def run(c, program, k, jets, groups):
-    """Run the rows of a program at order k; groups[g] says whether group g is on.
-
-    A table, for it compiles in a fraction of the time of calls written out.
-    """
-    for row in range(program.shape[0]):
-        operation, a, b, q = program[row, 0], program[row, 1], program[row, 2], program[row, 3]
-        if not groups[program[row, 5]]:
-            continue
-        factor, first, last, at = float(program[row, 4]), 0, k + 1, k
-        if operation == RATE:
-            factor /= k + 1
-            at = k + 1
-        elif operation != PRODUCT:
-            for n in range(c.shape[1]):
-                c[q, n, k] = c[a, n, k]
-            # The terms that hold a coefficient of the result found before.
-            factor = -1.0
-            last = k
-            a = q
-            if operation == ROOT:
-                first, b = 1, q
-        _add_product(c, a, b, k, first, last, factor, jets, q, at)
-        if operation == ROOT and k == 0:
-            _root(c, q, jets)
-        elif operation != RATE and operation != PRODUCT:
-            _divide(c, b, 2.0 if operation == ROOT else 1.0, jets, q, k)
-
-
-@helper
-def clear(c, first, last, k):
-    """Set coefficient k of the quantities first..last-1 to zero."""
-    for q in range(first, last):
-        for n in range(c.shape[1]):
-            c[q, n, k] = 0.0
 
 
 @helper
@@ -176,11 +98,11 @@ def march_of(expand: Callable, length: Callable, crossings: Callable) -> Callabl
     """The march for one set of equations."""
 
     @helper
-    def march(c, new, parameters, jets, degree, paid, low, end, max_steps, trace):
+    def march(c, new, parameters, jets, degree, paid, low, end, max_steps):
         """March from the state in c[:, :, 0], with paid + low of cable paid out, to that of the jet `end`.
 
-        The state reached is left in c[:, :, 0], with the jets of `end`. trace[i] : paid-out length and values of the
-        state after step i, as many as there is room for. Returns the zeros of the variation passed, steps and a status.
+        The state reached is left in c[:, :, 0], with the jets of `end`. Returns the zeros of the variation passed,
+        steps and a status.
         """
         h = np.zeros(c.shape[1])
         still = np.zeros(c.shape[1])
@@ -216,10 +138,6 @@ def march_of(expand: Callable, length: Callable, crossings: Callable) -> Callabl
                     c[quantity, n, 0] = new[quantity, n]
                     if not np.isfinite(new[quantity, n]):
                         return count, steps, status.BAD_INPUT
-                if steps < len(trace):
-                    trace[steps, quantity - 1] = new[quantity, 0]
-            if steps < len(trace):
-                trace[steps, 0] = paid + low
             steps += 1
         return count, steps, status.OK
 

@@ -82,7 +82,6 @@ def shoot_each(a, mu, tau_end, max_steps, ends, counts, statuses):
     """Shots of offsets a[i] at t = mu[i] over tau_end[i] of cable, one after the other; results as of `march`."""
     c = np.zeros((STATE, 2, ORDER + 1))
     new = np.zeros((STATE, 2))
-    trace = np.empty((0, STATE - 1))
     jets = SLOPE
     for i in range(len(a)):
         if not (
@@ -96,7 +95,7 @@ def shoot_each(a, mu, tau_end, max_steps, ends, counts, statuses):
         counts[i], statuses[i] = 0, status.OK
         if not ended:
             end = np.array([tau_end[i], 0.0])
-            counts[i], _, statuses[i] = _march(c, new, mu[i], jets, 1, tau, 0.0, end, max_steps, trace)
+            counts[i], _, statuses[i] = _march(c, new, mu[i], jets, 1, tau, 0.0, end, max_steps)
         elif not (np.isfinite(c[P, 0, 0]) and np.isfinite(c[P, 1, 0])):
             statuses[i] = status.BAD_INPUT
         ends[i, 0] = tau_end[i]

@@ -12,8 +12,8 @@ COLUMNS = 10
 TIP = LONG(1e-11)
 
 
-def slopes(state, gamma2, c, w, c_t):
-    """d(x, y, z, R)/ds, Eqs. (19)-(21)."""
+def slopes(state, gamma2, c, w, c_t, c_s=0, b_s=np.inf):
+    """d(x, y, z, R)/ds, Eqs. (19)-(21); the side force of DTMB Report 713."""
     position, force = state[:3], state[3:]
     tangent = force / np.sqrt(force @ force)
     velocity = np.array([-position[1], position[0], LONG(0)])
@@ -21,6 +21,10 @@ def slopes(state, gamma2, c, w, c_t):
     across = velocity - along * tangent
     load = np.array([gamma2 * position[0], gamma2 * position[1], w])
     load = load - gamma2 * (c * np.sqrt(across @ across) * across + c_t * abs(along) * along * tangent)
+    if c_s:
+        speed = np.sqrt(velocity @ velocity)
+        sine = np.sqrt(across @ across) / speed
+        load = load + gamma2 * c_s * speed / (1 + (sine / b_s) ** 2) * np.cross(tangent, velocity)
     return np.concatenate([tangent, -load])
 
 
@@ -46,14 +50,17 @@ def _above_tip(r, gamma2, c, w, c_t):
 
 
 def shot(r, gamma, system):
-    """State at the tow point of a shot with the fish at (r, 0, 0), lengths over the tow radius; long doubles."""
+    """State at the tow point of a shot with the fish at (r, 0, 0), lengths over the tow radius; long doubles.
+
+    Without a fish there must be no side force: it would turn the tip.
+    """
     g2 = LONG(gamma) ** 2
     r = LONG(r)
-    arguments = g2, LONG(system.C), LONG(system.w), LONG(system.C_t)
+    arguments = g2, LONG(system.C), LONG(system.w), LONG(system.C_t), LONG(system.C_s), LONG(system.b_s)
     state = np.array([r, 0, 0, g2 * LONG(system.m_f) * r, -LONG(system.C_f) * g2 * r * r, LONG(system.w_f)], dtype=LONG)
     left = LONG(system.lam)
     if not state[3:].any():
-        state, left = _above_tip(r, *arguments), left - TIP
+        state, left = _above_tip(r, *arguments[:4]), left - TIP
     h = min(LONG(system.lam) / 1000, left if left < 1 else LONG(1))
     if left < system.lam:
         h = TIP

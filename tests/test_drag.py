@@ -14,14 +14,15 @@ from scipy.integrate import solve_bvp, solve_ivp
 
 import towatlas
 from towatlas.kernels import drag as kernel
-from towatlas.kernels import series as series_kernel
 from towatlas.kernels import status
-from towatlas.kernels.series import FIRST, ORDER
+from towatlas.kernels.steppers import ORDER
+from towatlas.kernels.system import COLUMNS
+from towatlas.kernels.vector import LANES, aligned
 from towatlas.report.page import PHOTOGRAPHS
 from towatlas.solve.drag_equilibria import solve_drag_equilibria
 from towatlas.solve.jets import jets_of
 from towatlas.solve.shapes import shape_of
-from towatlas.solve.shots import shoot
+from towatlas.solve.shots import direction_of, shoot
 from towatlas.system import System
 
 
@@ -87,7 +88,7 @@ def test_vacuum_as_drag_vanishes():
         differences = []
         for c in (1e-8, 1e-10):
             found = towatlas.equilibria(lam, w_f, gamma, C=c)
-            assert list(found.branch) == list(vacuum.branch)
+            assert list(found.nodes) == list(vacuum.nodes)
             differences.append(np.abs(found.r_f / vacuum.r_f - 1.0).max())
         assert differences[1] < max(1e-12, 0.02 * differences[0])
 
@@ -99,7 +100,8 @@ def test_shell(capsys):
     assert code == 0
     rows = json.loads(out)
     assert [row["nodes"] for row in rows] == [1, 2, 0]
-    assert [row["branch"] for row in rows] == ["1 outer", "2 inner", "outward"]
+    assert [row["branch"] for row in rows] == ["shape 2", "shape 1", "shape 3"]
+    assert [row["near_axis"] for row in rows] == [False, True, False]
     assert [row["expected"] for row in rows] == [False, True, False]
     assert all(row["boundary_error"] is None for row in rows)
     assert "shots with derivative" in err
@@ -137,16 +139,24 @@ def test_single_equilibrium_near_the_axis():
 FULL = System(12.0, 2.0, 3.0, C=0.3, C_f=0.2, w=0.8, C_t=0.05)
 
 
-def _full():
-    s = FULL
-    return towatlas.equilibria(s.lam, s.w_f, 0.8, C=s.C, m_f=s.m_f, C_f=s.C_f, w=s.w, C_t=s.C_t)
+SIDE = replace(FULL, C_s=0.08, b_s=0.3)
+# Systems and speeds with every force, to either hand, whose cable and fish sink or float.
+BALANCED = {
+    "sinking": (FULL, 0.8),
+    "bare": (System(8.0, 0.0, 0.0, C=0.05), 1.1),
+    "starboard": (SIDE, 0.8),
+    "port": (SIDE, -0.8),
+    "floating cable": (replace(SIDE, w=-0.4), 0.8),
+    "floating fish": (replace(SIDE, w_f=-1.5), -0.6),
+    "floating": (replace(SIDE, w=-0.4, w_f=-1.5, C_s=-0.08), 0.8),
+}
 
 
-@pytest.mark.parametrize("found", [_full, lambda: towatlas.equilibria(8.0, 0.0, 1.1, C=0.05)])
-def test_balance_of_forces_and_moments(found):
+@pytest.mark.parametrize("case", BALANCED)
+def test_balance_of_forces_and_moments(case):
     """The reaction at the tow point carries the loads of the whole cable and of the fish, and their moments."""
-    found = found()
-    system, g2 = found.system, found.gamma**2
+    system, gamma = BALANCED[case]
+    found, g2 = solve_drag_equilibria(system, gamma), gamma**2
     edges = np.linspace(0, system.lam, 61)
     x, weights = np.polynomial.legendre.leggauss(12)
     # Towards the fish the shape of a bare tip bends on ever smaller lengths.
@@ -157,16 +167,20 @@ def test_balance_of_forces_and_moments(found):
         position = np.stack([shape.x.values, shape.y.values, shape.z.values])
         force = np.stack([shape.R_x.values, shape.R_y.values, shape.R_z.values])
         tangent = force / shape["T"].values
-        velocity = np.stack([-shape.y.values, shape.x.values, 0 * shape.x.values])
+        velocity = np.sign(gamma) * np.stack([-shape.y.values, shape.x.values, 0 * shape.x.values])
         along = np.sum(velocity * tangent, axis=0)
         across = velocity - along * tangent
         load = np.stack([g2 * shape.x.values, g2 * shape.y.values, np.full(len(s), system.w)])
         load -= g2 * system.C * np.linalg.norm(across, axis=0) * across
         load -= g2 * system.C_t * np.abs(along) * along * tangent
+        speed = np.linalg.norm(velocity, axis=0)
+        sine = np.linalg.norm(across, axis=0) / speed
+        side = g2 * system.C_s * speed / (1 + (sine / system.b_s) ** 2)
+        load += side * np.cross(tangent, velocity, axis=0)
         fish = np.array([found.x_f[which], found.y_f[which], found.z_f[which]])
         r_f = np.hypot(*fish[:2])
         on_fish = np.array([g2 * system.m_f * fish[0], g2 * system.m_f * fish[1], system.w_f])
-        on_fish -= system.C_f * g2 * r_f * np.array([-fish[1], fish[0], 0])
+        on_fish -= system.C_f * g2 * r_f * np.sign(gamma) * np.array([-fish[1], fish[0], 0])
         reaction = np.array([found.R_x0[which], found.R_y0[which], found.R_z0[which]])
         total = load @ weight + on_fish
         scale = np.linalg.norm(reaction) + np.abs(load).sum(axis=0) @ weight
@@ -178,8 +192,8 @@ def test_balance_of_forces_and_moments(found):
 
 def test_collocation_finds_the_same_equilibria():
     """scipy's solve_bvp on the six equations and boundary conditions (20)-(23), from a guess a percent off."""
-    found = _full()
-    system, g2 = found.system, found.gamma**2
+    system, g2 = FULL, 0.8**2
+    found = solve_drag_equilibria(system, 0.8)
 
     def slopes(s, states):
         columns = [reference_drag.slopes(state, g2, system.C, system.w, system.C_t) for state in states.T]
@@ -220,13 +234,15 @@ def test_straight_trailing_cable(w):
     assert wrong[1] == pytest.approx(0.01 * wrong[0], rel=0.05)
 
 
-def test_jets_are_derivatives():
-    """To fourth order in the difference, on a shot with every term switched on."""
+@pytest.mark.parametrize("name", COLUMNS)
+def test_jets_are_derivatives(name):
+    """To fourth order in the difference, on a shot with every term switched on, whatever number of the system moves."""
     jets, r, gamma, h = jets_of(3, gamma=True, parameter=True), 3.0, 0.9, 1e-3
-    jet = shoot([r], gamma, FULL.row(), jets).log_rho[0]
+    full = replace(FULL, C_s=0.07, b_s=0.6)
+    jet = shoot([r], gamma, full.row(), jets, directions=direction_of((name,), full.row())).log_rho[0]
 
-    def shifted(log_r=0.0, log_gamma=0.0, log_drag=0.0):
-        system = replace(FULL, C=FULL.C * np.exp(log_drag))
+    def shifted(log_r=0.0, log_gamma=0.0, log_parameter=0.0):
+        system = replace(full, **{name: getattr(full, name) * np.exp(log_parameter)})
         return shoot([r * np.exp(log_r)], gamma * np.exp(log_gamma), system.row(), jets).log_rho[0]
 
     for axis, unit in enumerate(np.eye(3)):
@@ -242,24 +258,20 @@ def test_jets_are_derivatives():
 
 
 @pytest.mark.parametrize("m", [2, 4, 7, 10])
-def test_order_of_convergence_of_the_series(monkeypatch, m):
+def test_order_of_convergence_of_the_series(m):
     """One step with the terms to order m is wrong by h^(m+1), against an integrator in the report's own variables."""
-    # As plain Python: compiled on its own, this part of the kernel would take longer than all its uses here.
-    for module, names in (
-        (kernel, ("run", "clear", "_tension", "_expand", "_set_parameters")),
-        (series_kernel, ("_add_product", "_divide", "_root")),
-    ):
-        for name in names:
-            monkeypatch.setattr(module, name, getattr(module, name).py_func)
     c, c_t, w = 0.4, 0.1, 0.8
     # Units in which gamma is 1: those of the kernel are then the report's. X, Y, h, F_x, F_y, F_z.
     state = np.array([1.2, 0.5, 0.0, 0.7, -0.9, 1.5])
-    table = np.zeros((kernel.QUANTITIES, 1, ORDER + 1))
-    jets = jets_of(0)
-    system = System(5.0, 1.0, 1.0, C=c, w=w, C_t=c_t)
-    kernel._set_parameters(table, 1.0, 1.0, system.row(), jets.places)
-    table[FIRST : kernel.STATE, 0, 0] = state
-    kernel._expand(table, 0.0, w, jets.products)
+    coefficients, parameters, jets = aligned(kernel.QUANTITIES * kernel.KEPT), aligned(kernel.PARAMETERS), jets_of(0)
+    table = coefficients.reshape(kernel.QUANTITIES, kernel.KEPT, LANES)
+    system = System(5.0, 1.0, 1.0, C=c, w=w, C_t=c_t).row()
+    for lane in range(LANES):
+        kernel.set_parameters(parameters, lane, 1.0, 1.0, system, np.zeros_like(system), jets.places, 1)
+    table[kernel.X : kernel.STATE, 0] = state[:, None]
+    groups = np.full(kernel.GROUPS, True)
+    groups[kernel.ON_SIDE] = False
+    kernel.expand_jets(coefficients, parameters, jets.products, 1, groups)
 
     def slopes(sigma, y):
         down = np.concatenate([y[:2], [-y[2]], y[3:]])
@@ -269,11 +281,12 @@ def test_order_of_convergence_of_the_series(monkeypatch, m):
 
     h = np.array([1.0, 0.5]) * 10.0 ** (-7.0 / (m + 1))
     exact = solve_ivp(slopes, (0, h[0]), state, "DOP853", t_eval=h[::-1], rtol=1e-13, atol=1e-15).y[:, ::-1]
-    series = np.stack([np.polyval(table[q, 0, m::-1], h) for q in range(FIRST, kernel.STATE)])
+    terms = table[kernel.X : kernel.STATE, : ORDER + 1, LANES - 1]
+    series = np.stack([np.polyval(row[m::-1], h) for row in terms])
     coarse, fine = np.linalg.norm(series - exact, axis=0)
     assert np.log2(coarse / fine) == pytest.approx(m + 1, abs=0.25)
     # The terms beyond are what is missing.
-    whole = np.stack([np.polyval(table[q, 0, ::-1], h[1]) for q in range(FIRST, kernel.STATE)])
+    whole = np.array([np.polyval(row[::-1], h[1]) for row in terms])
     assert np.linalg.norm(whole - exact[:, 1]) < 1e-12
 
 
@@ -284,8 +297,8 @@ def test_what_a_shot_refuses():
     assert (long.status[0], long.steps[0]) == (status.STEP_LIMIT, 100_000)
     overflowing = shoot([1e200], 1.0, replace(system, lam=10.0, w_f=1.0, m_f=1e200).row(), jets_of(0))
     assert overflowing.status[0] == status.BAD_INPUT
-    with pytest.raises(ArithmeticError, match="too long"):
-        solve_drag_equilibria(system, 20.0)
+    with towatlas.patience(1.0), pytest.raises(towatlas.TooMuchWork, match="shots with drag: not finished"):
+        towatlas.equilibria(system.lam, 0.0, 20.0, C=system.C)
 
 
 @pytest.mark.parametrize(
@@ -297,8 +310,15 @@ def test_what_a_shot_refuses():
         ({"C_f": "much"}, "C_f must be a real number"),
         ({"m_f": -1}, "m_f must be finite and not negative"),
         ({"lam": 0}, "lam must be"),
-        ({"w_f": -1}, "w_f must be finite and not negative"),
-        ({"gamma": np.inf}, "gamma must be"),
+        ({"w_f": np.inf}, "w_f must be finite"),
+        ({"w_f": [1, 2]}, "w_f must be one number"),
+        ({"w_f": -1}, "lighter than the fluid, whose mass is its own: give m_f"),
+        ({"w_f": 0, "w": 0}, "nothing holds the cable down or up"),
+        ({"gamma": np.inf}, "gamma must be finite"),
+        ({"gamma": 0}, "gamma must not be zero"),
+        ({"C_s": np.nan}, "C_s must be finite"),
+        ({"b_s": 0}, "b_s, .* must be one positive number"),
+        ({"b_s": np.nan}, "b_s, .* must be one positive number"),
         ({"w": -1}, "w = .* must be one number above -1"),
         ({"w": 1.5}, "at most 1"),
     ],
@@ -317,9 +337,7 @@ def test_bad_points_of_a_shape():
     for bad in (True, 1.0, "sideways", -1):
         with pytest.raises(ValueError, match="root must be expected"):
             shape_of(found, bad)
-    assert shape_of(found, "outward").attrs["branch"] == "outward"
-    with pytest.raises(ValueError, match="give it a fish"):
-        towatlas.equilibria(5, 0, 1, C=0.1, w=0)
+    assert shape_of(found, "shape 1").attrs["branch"] == "shape 1"
 
 
 def test_python_of_the_page_runs():

@@ -6,6 +6,7 @@ Interpreted, an index out of range raises, a name without a value raises, and wh
 import os
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import numba
@@ -22,9 +23,10 @@ from towatlas.kernels.folds import Cables, Folds, solve_folds
 from towatlas.kernels.scan import forward_shots, scan_system
 from towatlas.kernels.sweeps import forward_shots_parallel, scan_systems_parallel, solve_folds_parallel
 from towatlas.limits import excess_length, long_cable, massless_cable
-from towatlas.solve.drag_shots import shoot as shoot_drag
 from towatlas.solve.jets import jets_of
 from towatlas.solve.members import shoot_singly
+from towatlas.solve.shots import direction_of
+from towatlas.solve.shots import shoot as shoot_drag
 from towatlas.system import System
 
 EPS = 2.0**-52
@@ -34,14 +36,16 @@ INTERPRETED = bool(numba.config.DISABLE_JIT)
 SHOTS = np.array([[0.7, 0.0, 12.0], [2.0, 0.0, 1e-6], [0.8, 1e-11, 6.0], [3.0, 5.0, 40.0], [20.0, 900.0, 60.0]]).T
 # lam, w_f, n of cables: the report's, two without a fish, one near its threshold.
 CABLES = np.array([[37.8, 1352.0, 2], [10.0, 0.0, 1], [4.4, 0.0, 2], [3.5, 0.01, 1]]).T
-# gamma, r_f and system of shots with drag: nothing but the vacuum; normal drag; all there is; a bare tip with drag.
+# gamma, r_f and system of shots with drag: nothing but the vacuum; normal drag; tangential drag too; a bare tip with
+# drag; side force.
 DRAG = [
     (1.5, 0.4, System(4.0, 0.5, 0.5)),
     (0.9, 0.6, System(1.5, 2.0, 2.5, C=0.05, C_f=0.2, w=0.8)),
     (1.2, 0.3, System(2.0, 1.0, 1.5, C=0.3, C_f=0.1, w=0.7, C_t=0.03)),
     (0.8, 0.5, System(1.0, 0.0, 0.0, C=0.2, C_t=0.02)),
+    (1.1, 0.4, System(1.5, 1.0, 1.5, C=0.2, C_f=0.1, w=0.8, C_t=0.02, C_s=0.05, b_s=0.4)),
 ]
-JETS = jets_of(1, gamma=True, drag=True)
+JETS = jets_of(1, gamma=True, parameter=True)
 
 
 @pytest.fixture(autouse=True)
@@ -79,12 +83,23 @@ def scan_of(lam, w_f, parallel=False):
     return results[0, 0]
 
 
-def drag_shot(case, parallel=False):
-    """One shot with drag, jets in r, gamma and C: X, Y, H, force and tension at the tow point; a row each."""
-    gamma, r, system = DRAG[case]
-    ends = shoot_drag(r * gamma**2, gamma, system.row(), JETS, parallel)
-    assert list(ends.status) == [status.OK]
-    return np.array([ends.X, ends.Y, ends.H, ends.FX, ends.FY, ends.FZ, ends.T])[:, 0]
+def drag_shots(cases, jets=JETS):
+    """Shots with drag side by side: X, Y, H, force and tension at the tow point, a row each, of every case."""
+    gamma, r = np.array([DRAG[case][:2] for case in cases]).T
+    systems = np.array([DRAG[case][2].row() for case in cases])
+    ends = shoot_drag(r * gamma**2, gamma, systems, jets, directions=direction_of(("C",), systems))
+    assert set(ends.status) == {status.OK}
+    return np.stack([ends.X, ends.Y, ends.H, ends.FX, ends.FY, ends.FZ, ends.T], axis=1)
+
+
+@cache
+def all_drag_shots():
+    return drag_shots(range(len(DRAG)))
+
+
+def drag_shot(case):
+    """One shot with drag, jets in r, gamma and C."""
+    return all_drag_shots()[case]
 
 
 def predictor(count):
@@ -186,6 +201,22 @@ def test_jets_keep_the_energy(case):
         assert tension[n] + square - system.w * h[n] == pytest.approx(value, abs=1e-14 * expected[0, 0, 0])
 
 
+def test_drag_in_any_company_is_the_same():
+    """Lanes know nothing of each other, not even that one has a side force."""
+    for case in (0, 4):
+        np.testing.assert_array_equal(drag_shots([case])[0], drag_shot(case))
+
+
+def test_slopes_written_out_are_those_of_the_program():
+    """Two kernels for the same equations: jets of one slope written out, and any jets by a table."""
+    fast = drag_shots([0, 1, 2, 3], jets_of(1))
+    table = all_drag_shots()[:4, :, :2]
+    # Of the amplitudes of the wave and of the force.
+    place, force = np.hypot(table[:, :2], table[:, 2:3]).max(axis=1), table[:, 6]
+    scale = np.stack([place, place, place, force, force, force, force], axis=1)
+    assert (np.abs(fast - table) <= 1e-12 * np.maximum(np.abs(scale), np.abs(scale[..., :1]))).all()
+
+
 def test_folds_are_folds():
     """On a shot of another kernel p is gamma^2 and its variation none; a forward shot ends in balance at the fish."""
     lam, w_f, n = CABLES
@@ -246,7 +277,6 @@ BUILDS = {
     "solve_folds": lambda: (folds_of(*CABLES[:, 1:]), folds_of(*CABLES[:, 1:], parallel=True)),
     "forward_shots": lambda: (forward_pair(forward_shots, 0, 2), forward_pair(forward_shots_parallel)),
     "scan_systems": lambda: (scan_of(2.5, 0.0), scan_of(2.5, 0.0, parallel=True)),
-    "shoot_drag": lambda: (drag_shot(0), drag_shot(0, parallel=True)),
 }
 
 
