@@ -57,17 +57,14 @@ class Photograph:
         if place + 1 == len(MODELS):
             return float("nan"), float("nan")
         scene = read_scene(self.scene).at(gamma=self.gamma)
-        found = compare(self.choice.answers[place], self.choice.answers[place + 1], scene, ())
+        found = compare(self.choice.answers[place], self.choice.answers[place + 1], scene)
         by_question = {difference.question: difference.relative for difference in found[:3]}
         return by_question["position"], by_question["tension"]
 
     def chosen(self, asked: Sequence[str], tolerance: float) -> str:
         """The model chosen for some questions."""
         scene = replace(read_scene(self.scene).at(gamma=self.gamma), tolerance=tolerance)
-        compared = [
-            int(d.quantity.split()[-1]) for d in self.choice.differences if d.quantity.startswith("critical speed")
-        ]
-        return choose(scene, self.choice.answers, asked, sorted(set(compared))).model
+        return choose(scene, self.choice.answers, asked).model
 
 
 def _timed(function: Callable[..., SceneAnswer], **options: Any) -> tuple[float, SceneAnswer]:
@@ -89,8 +86,7 @@ def measure(photographs: Sequence[tuple[str, float, int]] = PHOTOGRAPHS) -> list
         shape = {model: _timed(answer_scene, scene=scene, model=model, asked=HANGS) for model in MODELS}
         whole = {model: _timed(answer_scene, scene=scene, model=model) for model in MODELS}
         answers = [whole[model][1].choice.answer for model in MODELS]
-        # The last of the pairs that a scene solves is listed, not compared.
-        choice = choose(scene, answers, QUESTIONS, answers[0].speeds.n[:-1].tolist())
+        choice = choose(scene, answers, QUESTIONS)
         seconds = [{model: spent for model, (spent, _) in times.items()} for times in (shape, whole)]
         found.append(Photograph(name, gamma, nodes, choice, *seconds))
     return found

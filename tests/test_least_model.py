@@ -11,7 +11,6 @@ import pytest
 import reference_drag
 from helpers import changed, run
 
-import towatlas
 from benchmarks import models
 from towatlas.commands.scene import text_of
 from towatlas.kernels import status
@@ -20,8 +19,6 @@ from towatlas.scene.choice import choose, compare, least_model
 from towatlas.scene.file import make_scene, read_scene
 from towatlas.scene.jumps import answer_scene
 from towatlas.scene.models import QUESTIONS, check_questions, solvable_models, solve_model
-from towatlas.solve.equilibria import solve_equilibria
-from towatlas.system import System
 
 HANGS = ("nodes", "position", "tension")
 PAGE = (Path(__file__).parent.parent / "docs" / "scenes.md").read_text()
@@ -90,32 +87,49 @@ def test_buoyancy_without_drag():
 def test_differences():
     """Of two answers made up."""
     scene = make_scene(changed(fluid={"name": "vacuum"}))
-    ok, gone, lost = status.OK, status.NO_PAIR, status.NOT_CONVERGED
-    first = PairSpeeds.of_vacuum((1, 2, 3, 4, 5), (1.0, nan, nan, nan, 2.0), (ok, gone, gone, lost, ok))
-    one = solve_model(scene, "vacuum", first)
-    pairs = PairSpeeds.of_vacuum((1, 2, 3, 4, 5), (1.005, nan, 3.0, nan, 2.1), (ok, gone, ok, lost, ok))
+    one = solve_model(scene, "vacuum", (0.1 * scene.gamma, 10.0 * scene.gamma))
+    assert one.folds is not None
+
+    def jumping(below, above, complete=True):
+        speeds = np.array([below, above]) * scene.gamma
+        return replace(one.folds, gamma=speeds[np.isfinite(speeds)], complete=complete)
+
+    one = replace(one, folds=jumping(0.5, 2.0))
     moved = one.position + np.array([0.0, 0.0, 1.0])
-    other = replace(one, model="air", speeds=pairs, position=moved, tension=one.tension * 1.005, nodes=one.nodes + 1)
-    found = {d.quantity: d for d in compare(one, other, scene, (1, 2, 3, 4, 5))}
+    other = replace(
+        one,
+        model="air",
+        folds=jumping(0.5025, nan),
+        position=moved,
+        tension=one.tension * 1.005,
+        nodes=one.nodes + 1,
+    )
+    found = {d.quantity: d for d in compare(one, other, scene)}
     slant = np.linalg.norm(moved - [40.0, 0.0, 0.0])
     assert found["position of the fish"].relative == pytest.approx(1.0 / slant, rel=1e-12)
     assert found["tow tension"].relative == pytest.approx(1 - 1 / 1.005, rel=1e-9)
-    assert found["critical speed 1"].relative == pytest.approx(1 - 1 / 1.005, rel=1e-9)
-    assert found["critical speed 1"].by_larger == pytest.approx(scene.speed_of(1.005), rel=1e-15)
+    assert found["jump below"].relative == pytest.approx(1 - 1 / 1.005, rel=1e-9)
+    assert found["jump below"].by_larger == pytest.approx(scene.speed_of(0.5025 * scene.gamma), rel=1e-15)
     agreed = {quantity for quantity, d in found.items() if d.agrees}
-    assert agreed == {"position of the fish", "tow tension", "number of equilibria"} | {
-        f"critical speed {n}" for n in (1, 2)
+    assert agreed == {"position of the fish", "tow tension", "number of equilibria", "jump below"}
+    assert found["jump above"].words == f"{scene.speed_of(2.0 * scene.gamma):.4g}, none"
+    unknown = {d.quantity: d for d in compare(one, replace(other, folds=jumping(0.5, 2.0, False)), scene)}
+    assert unknown["jump above"].words.endswith(", not known")
+    assert not unknown["jump below"].agrees
+    none = {
+        d.quantity: d for d in compare(*(replace(answer, folds=jumping(nan, nan)) for answer in (one, other)), scene)
     }
-    assert found["critical speed 3"].words == f"none, {scene.speed_of(3.0):.4g}"
-    assert found["critical speed 4"].words == "not known, not known"
-    strict = {d.quantity for d in compare(one, other, replace(scene, tolerance=1e-3), (1,)) if d.agrees}
+    assert none["jump below"].agrees
+    assert none["jump above"].agrees
+    strict = {d.quantity for d in compare(one, other, replace(scene, tolerance=1e-3)) if d.agrees}
     assert strict == {"number of equilibria"}
-    assert compare(one, other, replace(scene, tolerance=0.5 / slant), ())[1].agrees is False
+    assert compare(one, other, replace(scene, tolerance=0.5 / slant))[1].agrees is False
+    # Without jumps of both nothing is said of them.
+    assert len(compare(replace(one, folds=None), other, scene)) == 4
     assert choose(scene, [one, other], ("tension",)).model == "vacuum"
     assert choose(scene, [one, other], ("nodes", "tension")).model == "air"
-    assert choose(scene, [one, other], ("speeds",), (1, 2)).model == "vacuum"
-    for n in (3, 4, 5):
-        assert choose(scene, [one, other], ("speeds",), (n,)).model == "air"
+    assert choose(scene, [one, other], ("speeds",)).model == "air"
+    assert choose(scene, [one, replace(other, folds=jumping(0.5, 2.01))], ("speeds",)).model == "vacuum"
 
 
 def test_one_model():
@@ -171,26 +185,6 @@ def test_far_beyond_the_drag_of_the_report():
     assert answer.position[:2] == pytest.approx([turned.real, turned.imag], rel=1e-9)
 
 
-def test_folds_of_a_bare_cable_scale():
-    """Loads over w: the cable of weight w at gamma is the one of weight 1 at gamma / sqrt(w), with the same C."""
-    w = 0.6
-    start, end = System(10.0, 0.0, 0.0, 0.02), System(10.0, 0.0, 0.0, 0.02, w=w)
-    folds = towatlas.solve_drag_folds(10.0, 0.0, 0.02, n=[1, 2])
-    found, codes = follow_folds(folds.r_f_appears, folds.appears, folds.status, start, end)
-    assert (codes == status.OK).all()
-    assert found == pytest.approx(folds.appears * np.sqrt(w), rel=1e-9)
-
-
-def test_folds_in_a_dense_fluid():
-    """Two equilibria more beyond one: the search from the other side, at given speed."""
-    system = replace(read_scene("skop-fig3").system("water"), w=0.7, m_f=1600.0, C=0.01, C_f=0.5)
-    pairs = pair_speeds(system, (2, 3))
-    assert (pairs.status == status.OK).any()
-    for gamma in pairs.appears[pairs.status == status.OK]:
-        below, above = (len(solve_equilibria(system, gamma * part)) for part in (0.998, 1.002))
-        assert above == below + 2
-
-
 def test_shell(capsys, tmp_path):
     arguments = ("scene", "skop-fig4", "--gamma", 4.77, "--atlas", tmp_path / "none.nc", "--asked", "nodes,tension")
     code, out, _ = run(capsys, *arguments, "--json")
@@ -203,7 +197,9 @@ def test_shell(capsys, tmp_path):
     near = next(row for row in answer["equilibria"] if row["expected"])
     assert near["nodes"] == 3
     assert near["r_f_m"] == pytest.approx(np.hypot(near["x_f_m"], near["y_f_m"]), rel=1e-12)
-    assert near["lag_deg"] == pytest.approx(np.degrees(np.arctan2(-near["y_f_m"], near["x_f_m"])), rel=1e-9)
+    assert near["phase_deg"] % 360.0 == pytest.approx(
+        np.degrees(np.arctan2(-near["y_f_m"], near["x_f_m"])) % 360.0, rel=1e-9
+    )
     code, out, _ = run(capsys, *arguments, "--model", "vacuum")
     assert code == 0
     assert "vacuum model: vacuum was asked for, and compared with no other" in out
