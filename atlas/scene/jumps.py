@@ -22,7 +22,7 @@ from towatlas.tables.critical import CriticalTable
 # A jump is near where its speed is within this share of the scene's.
 NEAR = 0.1
 # Jumps with drag are looked for between these shares of the speed.
-LOOKED = (1.0 / 30.0, 2.0)
+LOOKED = (1.0 / 30.0, 3.0)
 # Transitions listed at least, and asked for at a time.
 BLOCK = 6
 
