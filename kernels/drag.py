@@ -476,11 +476,11 @@ def start(c, p, jets, pairs, count, bare):
     if bare:
         _raise_tip(c, p, count)
     else:
-        _leave_flow(c, p, count)
+        _leave_flow(c, p, jets, count)
 
 
 @helper
-def _leave_flow(c, p, count):
+def _leave_flow(c, p, jets, count):
     """Go a bit up from a fish that has drag and neither weight nor mass."""
     r, w = load(p, R * count), load(p, WEIGHT * count)
     u = FLOW_REACH * load(p, FISH_DRAG * count) * r * r / square_root(r * r + w * w)
@@ -492,6 +492,8 @@ def _leave_flow(c, p, count):
         for q, load_of in ((FX, R), (FZ, WEIGHT)):
             place = (q * count + n) * KEPT
             store(c, place, load(c, place) + u * load(p, load_of * count + n))
+    # All of the flow is along the cable here.
+    _add_scaled(c, p, KAPPA_T, TY, ZERO, -1.0 * u, jets, count, FY, ZERO)
 
 
 @helper

@@ -52,7 +52,7 @@ from towatlas.kernels.drag import (
 )
 from towatlas.kernels.drag_slopes import COUNT, advance_slopes, expand_slopes
 from towatlas.kernels.steppers import ORDER
-from towatlas.kernels.system import C_F, M_F, W_F
+from towatlas.kernels.system import C_F, C_S, M_F, W_F
 from towatlas.kernels.vector import LANES, absolute, aligned, load, square_root, store
 
 EPS = 2.0**-52
@@ -249,11 +249,21 @@ def shoot_drag(shots, algebra, max_steps, reached, begin, stop):
     jobs, ended, over = np.full(LANES, IDLE), np.zeros(LANES, np.bool_), np.zeros(LANES, np.bool_)
     fresh, groups = np.zeros(LANES, np.bool_), np.full(GROUPS, True)
     at, busy = begin, 0
+    sided = False
     while True:
         filled = False
+        busy = 0
         for lane in range(LANES):
-            fresh[lane] = jobs[lane] == IDLE and at < stop
+            busy += jobs[lane] != IDLE
+        for lane in range(LANES):
+            fresh[lane] = False
+            if jobs[lane] == IDLE and at < stop:
+                another = shots.systems[at, C_S] != 0.0
+                sided = another if busy == 0 else sided
+                # The two programs round differently: lanes hold shots of one of them at a time.
+                fresh[lane] = not fast or another == sided
             if fresh[lane]:
+                busy += 1
                 jobs[lane] = at
                 reached.steps[at], reached.statuses[at] = 0, status.OK
                 reached.turns[at, :] = 0
@@ -261,13 +271,11 @@ def shoot_drag(shots, algebra, max_steps, reached, begin, stop):
                 filled = True
         if filled:
             _begin(shots, algebra, jobs, fresh, work, count)
-        busy = 0
         idle = False
         groups[ON_NORMAL] = groups[ON_TANGENT] = groups[ON_SIDE] = False
         for lane in range(LANES):
             over[lane] = fresh[lane] and not paid[lane] < ends[lane]
             idle = idle or over[lane]
-            busy += jobs[lane] != IDLE
             if jobs[lane] != IDLE:
                 groups[ON_NORMAL] |= p[NORMAL * count * LANES + lane] != 0.0
                 groups[ON_TANGENT] |= p[TANGENTIAL * count * LANES + lane] != 0.0

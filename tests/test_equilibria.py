@@ -194,8 +194,8 @@ def test_any_system(lam, w_f, gamma):
     [
         ((np.nan, 0, 1), "lam must be finite"),
         ((0, 0, 1), "lam must be finite and positive"),
-        ((3, -1, 1), "w_f must be finite and not negative"),
-        ((3, 0, 0), "gamma must be finite and positive"),
+        ((3, -1, 1), "w_f = -1 is a fish lighter than the fluid, whose mass is its own: give m_f"),
+        ((3, 0, 0), "gamma must not be zero: positive in a turn to starboard"),
         ((3, 0, np.inf), "gamma must be finite"),
         (([3, 4], 0, 1), "lam must be one number"),
         (("3", 0, 1), "lam must be a real number"),
@@ -228,8 +228,8 @@ def test_shell(capsys):
     rows = json.loads(out)
     assert code == 0
     assert err == "" or "compiling, once" in err
-    names = "R_x0 R_y0 R_z0 x_f y_f z_f r_f lag tension error boundary_error"
-    assert list(rows[0]) == ["schema_version", "branch", "nodes", "expected", *names.split()]
+    names = "R_x0 R_y0 R_z0 x_f y_f z_f r_f phase_deg tension error boundary_error"
+    assert list(rows[0]) == ["schema_version", "branch", "nodes", "expected", "near_axis", *names.split()]
     assert [row["expected"] for row in rows] == [False, False, True, False, False]
     assert rows[2]["R_x0"] == pytest.approx(534.2432718, abs=6e-8)
     code, out, _ = run(capsys, "equilibria", "--lam", 37.8, "--wf", 1352, "--gamma", 5.94)

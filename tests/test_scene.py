@@ -106,6 +106,8 @@ def test_groups_by_hand():
         "m_f": 70 / (unit * 40),
         "C_f": 0.5 * 1025 * 0.8 * 0.05 / unit,
         "C_t": 0.0,
+        "C_s": 0.0,
+        "b_s": math.inf,
     }
     assert wet.gamma == pytest.approx(2.0 / math.sqrt(40 * 9.80665), rel=1e-14)
     assert vars(wet.system("water")) == pytest.approx(expected, rel=1e-14)
@@ -246,9 +248,11 @@ def test_answers_for_a_scene(ask):
     answer = json.loads(out)
     test = read_scene("skop-fig3").at(gamma=3.3)
     groups = test.system("vacuum")
-    assert list(answer["groups"]) == ["lam", "w_f", "m_f", "C", "C_f", "w", "C_t", "gamma"]
-    assert answer["groups"] == vars(test.system("air")) | {"gamma": test.gamma}
-    assert answer["groups_by_model"]["water"] == vars(test.system("water")) | {"gamma": test.gamma}
+    assert list(answer["groups"]) == ["lam", "w_f", "m_f", "C", "C_f", "w", "C_t", "C_s", "b_s", "gamma"]
+    # JSON has no infinity.
+    more = {"b_s": None, "gamma": test.gamma}
+    assert answer["groups"] == vars(test.system("air")) | more
+    assert answer["groups_by_model"]["water"] == vars(test.system("water")) | more
     assert answer["speed"]["speed_m_s"] == pytest.approx(3.3 * math.sqrt(0.0174625 * 9.80665), rel=1e-14)
     assert answer["speed"]["speed_kn"] == pytest.approx(answer["speed"]["speed_m_s"] * 3600 / 1852, rel=1e-14)
     assert answer["speed"]["rpm"] == pytest.approx(answer["speed"]["speed_m_s"] / 0.0174625 * 30 / math.pi, rel=1e-14)
