@@ -442,8 +442,8 @@ def set_parameters(p, lane, r, gamma2, system, direction, places, count):
     if places[3] > 0:
         at = places[3] * LANES + lane
         p[SPEED2 * step + at] = 2.0 * gamma2
-        for row in (KAPPA, KAPPA_T, KAPPA_S):
-            p[row * step + at] = -2.0 * p[row * step + lane]
+        for drag in (KAPPA, KAPPA_T, KAPPA_S):
+            p[drag * step + at] = -2.0 * p[drag * step + lane]
     if places[4] > 0:
         at = places[4] * LANES + lane
         p[KAPPA * step + at] = direction[C] / gamma2
@@ -456,10 +456,10 @@ def set_parameters(p, lane, r, gamma2, system, direction, places, count):
         p[FISH_MASS * step + at] = direction[M_F]
         p[FISH_DRAG * step + at] = direction[C_F]
         p[LENGTH * step + at] = direction[LAM]
-    for mask, row in ((NORMAL, KAPPA), (TANGENTIAL, KAPPA_T), (SIDE, KAPPA_S)):
-        moving = p[row * step + lane] != 0.0
+    for mask, drag in ((NORMAL, KAPPA), (TANGENTIAL, KAPPA_T), (SIDE, KAPPA_S)):
+        moving = p[drag * step + lane] != 0.0
         if places[4] > 0:
-            moving = moving or p[row * step + places[4] * LANES + lane] != 0.0
+            moving = moving or p[drag * step + places[4] * LANES + lane] != 0.0
         p[mask * step + lane] = 1.0 if moving else 0.0
 
 

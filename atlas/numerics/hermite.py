@@ -32,17 +32,17 @@ def cubic(a: Any, b: Any, slope_a: Any, slope_b: Any, width: Any, t: Any) -> Any
     return s * s * (1.0 + 2.0 * t) * a + t * t * (1.0 + 2.0 * s) * b + s * t * width * (s * slope_a - t * slope_b)
 
 
-def cubic_coefficients(a: float, b: float, slope_a: float, slope_b: float, width: float) -> np.ndarray:
+def cubic_coefficients(a: Any, b: Any, slope_a: Any, slope_b: Any, width: Any) -> np.ndarray:
     """Coefficients of the same cubic in the share t.
 
     Parameters
     ----------
-    a, b, slope_a, slope_b, width : float
+    a, b, slope_a, slope_b, width : float or ndarray, shape (...)
         As of `cubic`.
 
     Returns
     -------
-    ndarray, shape (4,)
+    ndarray, shape (4, ...)
         Highest power first, as `numpy.polyval` takes them.
     """
     rise_a, rise_b, rise = width * slope_a, width * slope_b, b - a

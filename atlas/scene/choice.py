@@ -232,7 +232,7 @@ def _jump_difference(smaller: ModelAnswer, larger: ModelAnswer, scene: Scene, ab
     """The jump next to the speed by two models; two that do not exist agree, one that is not known with nothing."""
     assert smaller.folds is not None
     assert larger.folds is not None
-    (a, code_a), (b, code_b) = (_nearest(answer.folds, scene.gamma, above) for answer in (smaller, larger))
+    (a, code_a), (b, code_b) = (_nearest(folds, scene.gamma, above) for folds in (smaller.folds, larger.folds))
     known = code_a == code_b == status.OK
     relative = abs(a / b - 1.0) if known else nan
     return Difference(

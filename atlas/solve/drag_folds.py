@@ -378,7 +378,7 @@ def _look(table: dict[str, NDArray[Any]], row: int, system: Array, n: int, gamma
     for name, wanted, rises in (("appears", "", True), ("ends", "_ends", False)):
         of_pair = np.flatnonzero((found.n == n) & ((found.shapes_above > found.shapes_below) == rises))
         there = len(of_pair) > 0
-        k = of_pair[0 if rises else -1] if there else 0
+        k = int(of_pair[0 if rises else -1]) if there else 0
         table[name][row] = found.gamma[k] if there else np.nan
         table[f"r_f_{name}"][row] = found.r_f[k] if there else np.nan
         table[f"status{wanted}"][row] = status.OK if there else status.NO_PAIR if rises else status.NEVER_ENDS

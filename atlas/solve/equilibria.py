@@ -142,7 +142,7 @@ def solve_equilibria(system: System, gamma: float) -> Equilibria:
         y_f=np.zeros(rows),
         z_f=found.z_f[order],
         r_f=np.abs(x_f),
-        phase_deg=180.0 * nodes[order],
+        phase_deg=180.0 * nodes[order].astype(float),
         tension=np.hypot(system.w_f + system.lam, r_x0),
         nodes=nodes[order],
         branch=branch[order],
