@@ -364,9 +364,8 @@ def _fold_rows(*, lam: Array, w_f: Array, n: Integers, which: Integers, c: Array
         "status_cusp": cusp_codes[which].astype(np.int8),
     }
     lost = (table["status"] == status.NOT_CONVERGED) | (table["status_ends"] == status.NOT_CONVERGED)
-    for row in np.flatnonzero(lost & (vacuum["status"][which] == status.OK)):
-        cable = which[row]
-        _look(table, int(row), systems[row], int(n[cable]), float(vacuum["gamma"][cable]))
+    for k in np.flatnonzero(lost & (vacuum["status"][which] == status.OK)):
+        _look(table, int(k), systems[k], int(n[which[k]]), float(vacuum["gamma"][which[k]]))
     return table
 
 
