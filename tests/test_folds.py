@@ -209,7 +209,7 @@ def test_shell(capsys):
 @pytest.mark.parametrize(("scene", "speeds"), [(DEEP, (2.5292, 2.6272)), (WIRE, (65.122, 91.182))])
 def test_jumps_of_scenes(scene, speeds, capsys, tmp_path):
     answer = answer_scene(make_scene(scene))
-    folds = answer.choice.answer.folds
+    folds = answer.folds
     np.testing.assert_allclose(answer.scene.speed_of(folds.gamma), speeds, rtol=1e-4)
     assert len(answer.equilibria) == 3
 

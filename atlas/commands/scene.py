@@ -156,7 +156,7 @@ def _equilibria(answer: SceneAnswer) -> list[dict[str, Any]]:
 
 def _folds(answer: SceneAnswer) -> list[dict[str, Any]]:
     """Jumps of the model used, all that there are between the speeds looked at."""
-    scene, folds = answer.scene, answer.choice.answer.folds
+    scene, folds = answer.scene, answer.folds
     if folds is None:
         return []
     words = status.FLAG_MEANINGS.split()
@@ -244,7 +244,7 @@ def text_of(answer: SceneAnswer) -> str:
     for name in by_model["vacuum"]:
         lines.append(f"{name:<8}" + "".join(f" {_cell(by_model[model][name]):>12}" for model in MODELS))
     lines += ["", *_model_lines(answer.choice), "", *_jump_lines(answer), ""]
-    if answer.choice.model != "vacuum" and answer.choice.answer.folds is not None:
+    if answer.choice.model != "vacuum" and answer.folds is not None:
         lines += [*_fold_lines(answer), ""]
     lines.append(
         f"equilibria ({answer.choice.model} model), the fish in m, forces in N, its phase behind the tow point"
@@ -275,7 +275,7 @@ def _model_lines(choice: Choice) -> list[str]:
 
 def _fold_lines(answer: SceneAnswer) -> list[str]:
     """Jumps with drag."""
-    scene, folds = answer.scene, answer.choice.answer.folds
+    scene, folds = answer.scene, answer.folds
     assert folds is not None
     low, high = (_cell(scene.speed_of(scene.gamma * share), 4) for share in LOOKED)
     rows = _folds(answer)

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from towatlas.effort import check_foreseen, check_patience
 from towatlas.kernels import status
 from towatlas.limits import transitions
-from towatlas.results import Equilibria
+from towatlas.results import Equilibria, Folds
 from towatlas.scene.choice import Choice, least_model
 from towatlas.scene.models import QUESTIONS
 from towatlas.scene.scene import Scene, patient_with
 from towatlas.solve.critical import SECONDS_A_HALF_WAVE, solve_critical
+from towatlas.solve.folds import name_folds
 from towatlas.solve.members import REMEDY
 from towatlas.solve.passed import guess_passed
 from towatlas.tables.atlas import Atlas
@@ -113,11 +114,14 @@ class SceneAnswer:
         By the vacuum model, dimensionless.
     choice : Choice
         The model used and why, with its answers in SI.
+    folds : Folds or None
+        All jumps of the model used between the speeds looked at, dimensionless; None where none were asked for.
     """
 
     scene: Scene
     jumps: Jumps
     choice: Choice
+    folds: Folds | None
 
     @property
     def equilibria(self) -> Equilibria:
@@ -223,4 +227,5 @@ def _answer(scene: Scene, atlas: Atlas | None, model: str | None, asked: Sequenc
     jumps = critical_speeds(lam=groups.lam, w_f=groups.w_f, gamma=gamma, atlas=atlas)
     looked = (gamma * LOOKED[0], gamma * LOOKED[1])
     choice = least_model(scene, model, asked, looked)
-    return SceneAnswer(scene=scene, jumps=jumps, choice=choice)
+    folds = choice.answer.folds
+    return SceneAnswer(scene=scene, jumps=jumps, choice=choice, folds=None if folds is None else name_folds(folds))

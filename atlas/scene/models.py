@@ -37,7 +37,8 @@ class ModelAnswer:
     tension : float
         At the tow point [N], > 0.
     folds : Folds or None
-        Jumps between the speeds looked at, dimensionless; None where none were asked for.
+        Jumps between the speeds looked at, dimensionless; None where none were asked for. Where they come from is not
+        found out.
     """
 
     model: str
@@ -131,7 +132,7 @@ def solve_model(
     jumps = None
     if looked is not None:
         # A fluid without drag and buoyancy is a vacuum.
-        jumps = vacuum if system.in_vacuum and vacuum is not None else folds_in_speed(system, *looked)
+        jumps = vacuum if system.in_vacuum and vacuum is not None else folds_in_speed(system, *looked, named=False)
     return ModelAnswer(
         model=model,
         system=system,

@@ -8,7 +8,7 @@ where there is no fluid.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import inf
 
@@ -391,7 +391,7 @@ def folds(
         return solve_folds_between(system, speed, moved, high / low)
 
 
-def folds_in_speed(system: System, low: float, high: float) -> Folds:
+def folds_in_speed(system: System, low: float, high: float, named: bool = True) -> Folds:
     """Folds of a system between two speeds; no checks.
 
     Parameters
@@ -399,6 +399,8 @@ def folds_in_speed(system: System, low: float, high: float) -> Folds:
     system : System
     low, high : float
         [-], of one sign, the slower first.
+    named : bool
+        Whether it is found out where each comes from, which takes longer than finding them; else `name_folds` does it.
 
     Returns
     -------
@@ -406,10 +408,35 @@ def folds_in_speed(system: System, low: float, high: float) -> Folds:
     """
     if system.in_vacuum:
         return _in_vacuum(system, abs(low), abs(high), np.sign(low))
-    return solve_folds_between(system, low, ("gamma",), high / low)
+    return solve_folds_between(system, low, ("gamma",), high / low, named)
 
 
-def solve_folds_between(system: System, gamma: float, moved: tuple[str, ...], factor: float) -> Folds:
+def name_folds(folds: Folds) -> Folds:
+    """Folds in speed with n and origin.
+
+    Parameters
+    ----------
+    folds : Folds
+        From `folds_in_speed`.
+
+    Returns
+    -------
+    Folds
+    """
+    if folds.system.in_vacuum:
+        return folds
+    x = np.log(folds.r_f * np.square(folds.gamma))
+    n = _numbers(x, np.tile(folds.system.row(), (len(x), 1)), folds.gamma, folds.system.w_f >= 0.0)
+    return replace(folds, n=n, origin=_origins(n))
+
+
+def _origins(n: Integers) -> NDArray[np.str_]:
+    return np.where(n > 0, "vacuum", "drag").astype(np.str_)
+
+
+def solve_folds_between(
+    system: System, gamma: float, moved: tuple[str, ...], factor: float, named: bool = True
+) -> Folds:
     """Folds from a system to what it becomes as some of its numbers grow by a factor; no checks.
 
     Parameters
@@ -421,6 +448,8 @@ def solve_folds_between(system: System, gamma: float, moved: tuple[str, ...], fa
         "gamma", or names of numbers of the system.
     factor : float
         > 1.
+    named : bool
+        Whether it is found out where each comes from.
 
     Returns
     -------
@@ -432,7 +461,7 @@ def solve_folds_between(system: System, gamma: float, moved: tuple[str, ...], fa
     t = np.array([fold.t for fold, _, _ in found])
     x = np.array([fold.x for fold, _, _ in found])
     rows, speeds = path.at(t)
-    n = _numbers(x, rows, speeds, system.w_f >= 0.0)
+    n = _numbers(x, rows, speeds, named and system.w_f >= 0.0)
     first = gamma if by_speed else getattr(system, moved[0])
     name = moved[0]
     searched = (
@@ -449,7 +478,7 @@ def solve_folds_between(system: System, gamma: float, moved: tuple[str, ...], fa
         shapes_below=np.array([below for _, below, _ in found], np.int64),
         shapes_above=np.array([above for _, _, above in found], np.int64),
         n=n,
-        origin=np.where(n > 0, "vacuum", "drag").astype(np.str_),
+        origin=_origins(n),
         error=np.array([fold.error for fold, _, _ in found]),
         status=np.full(len(t), status.OK, np.int8),
         complete=certain,
