@@ -271,7 +271,7 @@ def test_order_of_convergence_of_the_series(m):
     table[kernel.X : kernel.STATE, 0] = state[:, None]
     groups = np.full(kernel.GROUPS, True)
     groups[kernel.ON_SIDE] = False
-    kernel.expand_jets(coefficients, parameters, jets.products, 1, groups)
+    kernel.expand_jets(coefficients, parameters, jets.products, jets.pairs, 1, groups)
 
     def slopes(sigma, y):
         down = np.concatenate([y[:2], [-y[2]], y[3:]])
@@ -343,6 +343,7 @@ def test_bad_points_of_a_shape():
 def test_python_of_the_page_runs():
     text = (Path(__file__).parent.parent / "docs" / "drag.md").read_text()
     blocks = re.findall(r"```python\n(.*?)```", text, re.S)
-    assert len(blocks) == 2
+    assert len(blocks) == 3
+    names: dict = {}
     for block in blocks:
-        exec(block, {})
+        exec(block, names)

@@ -298,7 +298,9 @@ def small_results():
     yield each.T[1:], np.array([p_scale * root, p_scale, ends.z, q_scale * root, q_scale])
     for case in range(len(DRAG)):
         table = drag_shot(case)
-        place, height, force = np.hypot(*table[:2]), np.abs(table[2]), np.sqrt((table[3:6] ** 2).sum(axis=0))
+        # The amplitude of the wave: where the cable crosses the axis its slant makes it.
+        place = np.hypot(np.hypot(*table[:2]), np.hypot(*table[3:5]) / np.sqrt(table[6, 0]))
+        height, force = np.abs(table[2]), np.sqrt((table[3:6] ** 2).sum(axis=0))
         # Derivatives to the larger of their own amplitude and that of what they are derivatives of.
         rows = [np.maximum(size, size[0]) for size in (place, place, height, force, force, force, force)]
         yield table, np.array(rows)
