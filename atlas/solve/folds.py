@@ -333,10 +333,18 @@ def folds(
         Fish weight over (mu + rho A) g R [-]; its mass moves with it unless m_f is given.
     gamma : float or (float, float)
         Speed Omega sqrt(R/g) [-]; negative in a turn to port.
-    C, C_f, C_t : float or (float, float)
-        Drag constants of the cable, of the fish, and of the cable along its length [-], >= 0.
-    m_f, w, C_s, b_s : float
-        As of `equilibria`.
+    C : float or (float, float)
+        Drag constant of the cable [-], >= 0.
+    m_f : float, optional
+        Fish mass over (mu + rho A) R [-], >= 0; equal to w_f by default.
+    C_f : float or (float, float)
+        Drag constant of the fish [-], >= 0.
+    w : float
+        Weight of the cable [-], above -1, at most 1.
+    C_t : float or (float, float)
+        Tangential drag constant of the cable [-], >= 0.
+    C_s, b_s : float
+        Side force constant of a stranded cable, and the sine at which that force is largest [-], as of `equilibria`.
 
     Returns
     -------
@@ -364,8 +372,8 @@ def folds(
     Examples
     --------
     >>> found = folds(16, 3, (2, 3), C=5.6)
-    >>> [round(float(g), 6) for g in found.gamma], found.shapes_below[0], found.shapes_above[0], str(found.origin[0])
-    ([2.327475], 1, 3, 'drag')
+    >>> [round(float(g), 6) for g in found.gamma], found.shapes_above.tolist(), str(found.origin[0])
+    ([2.327475], [3], 'drag')
     """
     given = {"lam": lam, "w_f": w_f, "gamma": gamma, "C": C, "C_f": C_f, "C_t": C_t}
     arrays = {name: check_real(name, value) for name, value in given.items()}
