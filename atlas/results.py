@@ -71,8 +71,8 @@ class CriticalStates:
 class Equilibria:
     """Equilibria of one cable at one speed in any medium, in rising order of R_x0.
 
-    The tow point is at (1, 0, 0) and moves along y in a turn to starboard, against it in one to port; z points down. In a
-    vacuum everything lies in the plane y = 0.
+    The tow point is at (1, 0, 0) and moves along y in a turn to starboard, against it in one to port; z points down.
+    In a vacuum everything lies in the plane y = 0.
 
     Attributes
     ----------
