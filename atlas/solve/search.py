@@ -8,7 +8,6 @@ method in brackets finds the roots. Systems are worked on side by side: every ro
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from towatlas.effort import check_foreseen
 from towatlas.kernels import status
@@ -18,7 +17,6 @@ from towatlas.numerics.rows import bracket
 from towatlas.solve.jets import jets_of
 from towatlas.solve.shots import REMEDY, Array, Integers, shoot
 
-Booleans = NDArray[np.bool_]
 SLOPE = jets_of(1)
 
 # Points a decade at first; halvings of an interval at most; how well the interpolant of the tow point must predict the
