@@ -306,7 +306,7 @@ def test_time_runs_out(capsys):
 def test_an_order_too_high_says_that_patience_helps(capsys):
     code, _, err = run(capsys, "critical", "--lam", 1e9, "--wf", 1, "--n", 10**8, "--solve")
     assert code == 1
-    assert "more patience makes longer ones" in err
+    assert "more patience makes longer" in err
 
 
 def test_points_of_a_shape_are_limited(capsys):
@@ -364,8 +364,8 @@ def test_random_commands_answer_or_refuse(tmp_path):
 
 @pytest.mark.slow
 def test_a_worker_that_takes_too_long_is_killed_and_started_anew(monkeypatch):
-    many = random_commands.cases(2, 1, ["vacuum"])
+    short = random_commands.Case(1, "vacuum", ["equilibria", "--lam=5", "--wf=1", "--gamma=1"], "")
     long = random_commands.Case(0, "vacuum", ["equilibria", "--lam=1e4", "--wf=1", "--gamma=10", "--patience=inf"], "")
-    runs = list(random_commands.run_all([long, *many], 1.0))
+    runs = list(random_commands.run_all([long, short, short], 1.0))
     assert runs[0].exit == random_commands.KILLED
-    assert all(0 <= run.exit <= 5 for run in runs[1:])
+    assert [run.exit for run in runs[1:]] == [0, 0]
