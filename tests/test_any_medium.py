@@ -327,7 +327,9 @@ def test_shots_are_the_same_bits_in_any_order_and_company():
             finally:
                 numba.set_num_threads(threads)
             for name in vars(plain):
-                np.testing.assert_array_equal(getattr(ends, name), getattr(plain, name)[order])
+                # numpy's arctan2 rounds by where in an array a number is; the rest comes from the kernel.
+                close = 1e-15 if name == "angle" else 0.0
+                np.testing.assert_allclose(getattr(ends, name), getattr(plain, name)[order], rtol=close, atol=0.0)
         for k in (0, 40, 91):
             alone = shoot(r[k], gamma[k], systems[k], jets)
             np.testing.assert_array_equal(alone.log_rho[0], plain.log_rho[k])
