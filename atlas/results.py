@@ -153,7 +153,7 @@ class Folds:
     n : ndarray of int, shape (folds,)
         Number of the fold of the vacuum from which it is continued [-], >= 1; 0 for one that drag makes.
     origin : ndarray of str, shape (folds,)
-        "vacuum" or "drag".
+        "vacuum" or "drag"; empty, and n 0, where it was not asked for.
     error : ndarray, shape (folds,)
         Estimated relative error of `value` [-], > 0.
     status : ndarray of int8, shape (folds,)

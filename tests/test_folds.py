@@ -206,6 +206,15 @@ def test_shell(capsys):
         assert run(capsys, "folds", "--lam", 6, "--wf", 0.1, "--gamma", bad)[0] == 2
 
 
+def test_jumps_are_null_where_none_were_looked_for(capsys):
+    arguments = ("scene", "skop-fig3", "--model", "air", "--json", "--asked")
+    answer = json.loads(run(capsys, *arguments, "nodes")[1])
+    assert [answer[key] for key in ("jumps", "jumps_looked_at", "jumps_complete")] == [None] * 3
+    answer = json.loads(run(capsys, *arguments, "speeds")[1])
+    assert answer["jumps_complete"] is True
+    assert {row["origin"] for row in answer["jumps"]} == {"vacuum"}
+
+
 @pytest.mark.parametrize(("scene", "speeds"), [(DEEP, (2.5292, 2.6272)), (WIRE, (65.122, 91.182))])
 def test_jumps_of_scenes(scene, speeds, capsys, tmp_path):
     answer = answer_scene(make_scene(scene))

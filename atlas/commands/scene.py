@@ -215,8 +215,10 @@ def _object(answer: SceneAnswer) -> dict[str, Any]:
         "transitions": answer.jumps.existing,
         "critical_speeds_model": "vacuum",
         "critical_speeds": _jumps(scene, answer.jumps),
-        "jumps": _folds(answer),
-        "jumps_looked_at": [speeds(scene, scene.gamma * share) for share in LOOKED],
+        # None were looked for where speeds were not asked for.
+        "jumps": None if answer.folds is None else _folds(answer),
+        "jumps_looked_at": None if answer.folds is None else [speeds(scene, scene.gamma * share) for share in LOOKED],
+        "jumps_complete": None if answer.folds is None else answer.folds.complete,
         "equilibria": _equilibria(answer),
         "searched": answer.equilibria.searched,
     }

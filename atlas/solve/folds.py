@@ -486,7 +486,8 @@ def solve_folds_between(
         shapes_below=np.array([below for _, below, _ in found], np.int64),
         shapes_above=np.array([above for _, _, above in found], np.int64),
         n=n,
-        origin=_origins(n),
+        # Not found out is neither.
+        origin=_origins(n) if named else np.full(len(n), ""),
         error=np.array([fold.error for fold, _, _ in found]),
         status=np.full(len(t), status.OK, np.int8),
         complete=certain,
