@@ -57,6 +57,7 @@ class Progress:
 class _Budget:
     seconds: float
     began: float
+    each: float
 
     @property
     def used(self) -> float:
@@ -73,13 +74,16 @@ def _clock() -> float:
 
 
 @contextmanager
-def patience(seconds: float = SECONDS) -> Iterator[None]:
+def patience(seconds: float = SECONDS, each: float | None = None) -> Iterator[None]:
     """Allow everything within, together, so much CPU time; within another one, the outer counts.
 
     Parameters
     ----------
     seconds : float
         CPU time of the process without compilations [s], > 0; inf for no limit. Without this every call has 30 s.
+    each : float, optional
+        What one of many computations within may take, about [s], > 0: limits that grow with patience, as that of the
+        steps of a shot, follow it. Equal to `seconds` by default.
 
     Returns
     -------
@@ -100,15 +104,16 @@ def patience(seconds: float = SECONDS) -> Iterator[None]:
     ...     len(towatlas.equilibria(1000.0, 1.0, 1.0))
     39
     """
-    if isinstance(seconds, bool) or not isinstance(seconds, (int, float)) or not seconds > 0:
-        raise ValueError(f"seconds must be a positive number, of CPU time, or inf for no limit; got {seconds!r}")
+    for name, value in (("seconds", seconds), ("each", seconds if each is None else each)):
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not value > 0:
+            raise ValueError(f"{name} must be a positive number, of CPU time, or inf for no limit; got {value!r}")
     if _budget.get() is not None:
         try:
             yield
         finally:
             _listener(None)
         return
-    token = _budget.set(_Budget(seconds, _clock()))
+    token = _budget.set(_Budget(seconds, _clock(), seconds if each is None else each))
     try:
         yield
     finally:
@@ -130,7 +135,7 @@ def scaled(limit: int, most: int) -> int:
     int
     """
     budget = _budget.get()
-    return most if budget is None else int(min(most, max(1.0, limit * budget.seconds / SECONDS)))
+    return most if budget is None else int(min(most, max(1.0, limit * budget.each / SECONDS)))
 
 
 def check_patience(what: str, remedy: str, *, done: float = float("nan"), of: float = float("nan")) -> None:
@@ -156,6 +161,17 @@ def check_patience(what: str, remedy: str, *, done: float = float("nan"), of: fl
     _listener(progress)
     if progress.used > budget.seconds:
         raise TooMuchWork(f"{progress.words}: not finished in {budget.seconds:g} s of CPU; {_go_on(remedy)}")
+
+
+def limited() -> bool:
+    """Whether the time that there is has an end.
+
+    Returns
+    -------
+    bool
+    """
+    budget = _budget.get()
+    return budget is not None and budget.seconds < float("inf")
 
 
 def check_foreseen(seconds: float, what: str, remedy: str) -> None:

@@ -19,8 +19,8 @@ NO_CUSP = 11
 SENTENCES = {
     OK: "computed",
     NO_TRANSITION: "no such transition: the cable is not longer than lambda_cn",
-    STEP_LIMIT: "the shots are too long: too many nodes at this speed (in a vacuum more patience makes longer), or "
-    "too much drag where the cable is slack",
+    STEP_LIMIT: "the shots are too long: too many nodes at this speed, or too much drag where the cable is slack; with "
+    "more patience longer ones are made",
     NOT_CONVERGED: "the direct solver did not converge; please report the inputs",
     OUTSIDE: "outside the range of the atlas; ask for the direct solver",
     NOT_FOUND: "the scan found no such transition up to its highest speed",

@@ -19,8 +19,11 @@ from towatlas.scene.jumps import answer_scene
 from towatlas.scene.units import parse_quantity
 from towatlas.solve.batches import batches
 from towatlas.solve.critical import solve_rows
+from towatlas.solve.jets import jets_of
 from towatlas.solve.members import expected_work, shoot_lanes, shoot_singly
 from towatlas.solve.passed import folds_passed, guess_passed, guess_speed
+from towatlas.solve.shots import STEPS, shoot
+from towatlas.system import System
 
 # What may be added to the patience: one call of a kernel, and slow machines.
 SLACK = 10.0
@@ -55,6 +58,26 @@ def test_the_outermost_budget_counts(clock):
     with patience(math.inf), patience(5.0):
         clock[0] += 1e9
         check_patience("waiting", "")
+
+
+def test_one_of_many_has_its_own_share():
+    with patience(math.inf, each=60.0):
+        assert scaled(10, 10**6) == 20
+    with patience(90.0), patience(math.inf, each=60.0):
+        assert scaled(10, 10**6) == 30
+    with pytest.raises(ValueError, match="each must be"), patience(1.0, each=0.0):
+        pass
+
+
+def test_with_more_patience_longer_shots_with_drag_are_made():
+    # A bare stranded cable in drag so strong that it trails along its circle with hardly any tension.
+    row = System.of(lam=0.6, w_f=0.0, C=4800.0, C_s=165.0, b_s=0.16).row()
+    with patience(30.0):
+        few = shoot(1.1, 1.3, row, jets_of(0))
+    with patience(300.0):
+        more = shoot(1.1, 1.3, row, jets_of(0))
+    assert (few.status[0], few.steps[0], more.status[0]) == (status.STEP_LIMIT, STEPS, status.OK)
+    assert STEPS < more.steps[0] < 10 * STEPS
 
 
 def test_compiling_does_not_count(clock, monkeypatch):
@@ -306,7 +329,7 @@ def test_time_runs_out(capsys):
 def test_an_order_too_high_says_that_patience_helps(capsys):
     code, _, err = run(capsys, "critical", "--lam", 1e9, "--wf", 1, "--n", 10**8, "--solve")
     assert code == 1
-    assert "more patience makes longer" in err
+    assert "with more patience longer ones are made" in err
 
 
 def test_points_of_a_shape_are_limited(capsys):

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from towatlas.checks import check_real
-from towatlas.effort import check_patience, patience
+from towatlas.effort import SECONDS, check_patience, patience
 from towatlas.kernels import status
 from towatlas.kernels.system import COLUMNS, W_F, W
 from towatlas.solve.drag_equilibria import fill, quantities
@@ -98,7 +98,7 @@ def equilibria_many(
     shape = np.atleast_1d(arrays[0]).shape
     systems = np.stack([array.ravel() for array in arrays[:-1]], axis=1)
     speeds = arrays[-1].ravel().copy()
-    with patience(inf):
+    with patience(inf, each=SECONDS):
         columns, count, codes = _solve(systems, speeds)
     dims = ("system",) if len(shape) == 1 else tuple(f"system_{k}" for k in range(len(shape)))
     variables: dict[str, Any] = {}

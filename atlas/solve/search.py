@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from towatlas.effort import check_foreseen
+from towatlas.effort import check_foreseen, limited
 from towatlas.kernels import status
 from towatlas.kernels.system import LAM
 from towatlas.numerics.hermite import cubic, cubic_coefficients
@@ -41,10 +41,10 @@ BEYOND = 1.0 + 1e-9
 LOOKS = np.linspace(0.0, 1.0, 17)
 # Steps this small, in log r, are the last: the square of them is rounding.
 LAST_STEP = 1e-9
-# Where shots are made to foresee how long the others are, as shares of the range; and about how many those are, of
-# steps of so many seconds of CPU.
-PROBES = (0.2, 0.6, 0.9)
-EXPECTED_SHOTS, SECONDS_A_STEP = 100, 5e-7
+# Where shots are made to foresee how long the others are, as shares of the range, of so many of the systems; about how
+# many those are, and more where the angle of the tow point turns, a radian; steps of so many seconds of CPU.
+PROBES, PROBED = np.array([0.0, 0.2, 0.4, 0.6, 0.8, 0.95]), 4
+EXPECTED_SHOTS, SHOTS_A_RADIAN, SECONDS_A_STEP = 100, 1.0, 5e-7
 # Systems worked on at a time: their samples are what memory holds.
 BLOCK = 512
 
@@ -113,8 +113,8 @@ class _Search:
         self.unsearched = np.full((len(gamma), 2), np.nan)
 
     def found(self) -> Found:
+        self._foresee()
         low, high = self._range()
-        self._foresee(low, high)
         rows, x = self._first_points(low, high)
         rows, x, values = self._refined(rows, x)
         peaks = _peaks(rows, x, values)
@@ -153,8 +153,7 @@ class _Search:
 
     def _range(self) -> tuple[Array, Array]:
         """Bounds of x: from the linear limit to a straight cable."""
-        high = np.log(self.scale * (1.0 + self.systems[:, LAM]) * BEYOND)
-        low = np.log(FIRST_LOW * self.scale)
+        low, high = self._bounds()
         open_ = np.arange(len(low))
         while len(open_):
             log_rho, slope = self._shoot(open_, low[open_])[4:6]
@@ -165,16 +164,28 @@ class _Search:
         self.codes[:], self.unsearched[:] = status.OK, np.nan
         return low, high
 
-    def _foresee(self, low: Array, high: Array) -> None:
-        """Refuse at once what would take longer than there is patience for, by a few shots of each system."""
+    def _bounds(self) -> tuple[Array, Array]:
+        """Of x, at first."""
+        return np.log(FIRST_LOW * self.scale), np.log(self.scale * (1.0 + self.systems[:, LAM]) * BEYOND)
+
+    def _foresee(self) -> None:
+        """Refuse at once what would take longer than there is patience for, by a few shots of some systems."""
         count = len(self.gamma)
-        rows = np.tile(np.arange(count), len(PROBES))
-        x = np.concatenate([low + share * (high - low) for share in PROBES])
-        ends = shoot(np.exp(x), self.gamma[rows], self.systems[rows], SLOPE)
-        steps = float(ends.steps.sum()) / len(PROBES)
+        if not limited() or not count:
+            return
+        some = np.unique(np.linspace(0, count - 1, PROBED).astype(np.int64))
+        low, high = (bound[some, None] for bound in self._bounds())
+        x = low + PROBES * (high - low)
+        rows = np.repeat(some, len(PROBES))
+        ends = shoot(np.exp(x.ravel()), self.gamma[rows], self.systems[rows], SLOPE)
+        steps = ends.steps.reshape(x.shape)
+        turned = np.abs(np.diff(ends.angle.reshape(x.shape), axis=1))
+        shots = EXPECTED_SHOTS / (len(PROBES) - 1.0) + SHOTS_A_RADIAN * np.nan_to_num(turned)
+        total = (shots * 0.5 * (steps[:, 1:] + steps[:, :-1])).sum() * count / len(some)
+        expected = shots.sum() * count / len(some)
         check_foreseen(
-            steps * EXPECTED_SHOTS * SECONDS_A_STEP,
-            f"shots with drag of about {steps / max(1, count):,.0f} steps, some {EXPECTED_SHOTS * count:,} of them",
+            total * SECONDS_A_STEP,
+            f"shots with drag of about {total / expected:,.0f} steps, some {float(f'{expected:.2g}'):,.0f} of them",
             REMEDY,
         )
 

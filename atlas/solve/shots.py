@@ -6,16 +6,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from towatlas.effort import check_patience
+from towatlas.effort import check_patience, scaled
 from towatlas.kernels.system import C_S, COLUMNS, W_F, W
 from towatlas.solve.jets import Jets
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-MAX_STEPS = 10**5
-# Shots between two looks at the clock: all of the longest, some seconds.
-BATCH = 128
+# Of a shot: with the usual patience, and with any. More are taken by cables that all but float, bare at their end, in
+# drag so strong that they trail along their circle.
+STEPS, MOST_STEPS = 10**5, 10**7
+# Shots between two looks at the clock: at most, first and at least; about so many steps of them, some seconds.
+BATCH, FIRST_BATCH, LEAST_BATCH, STEPS_A_BATCH = 128, 32, 16, 4 * 10**6
 REMEDY = "a shorter cable, a lower speed or less drag makes shots shorter"
 
 
@@ -114,9 +116,13 @@ def shoot(
     turns, codes = np.empty((rows, 2), np.int64), np.empty(rows, np.int64)
     shots, algebra = Shots(r, np.square(speed), table, moved, part), Algebra(*jets.algebra)
     reached = Reached(state, steps, turns, codes)
-    for begin in range(0, rows, BATCH):
+    begin, batch, max_steps = 0, FIRST_BATCH, scaled(STEPS, MOST_STEPS)
+    while begin < rows:
         check_patience("shots with drag", REMEDY)
-        shoot_drag_threads(shots, algebra, MAX_STEPS, reached, begin, min(rows, begin + BATCH))
+        stop = min(rows, begin + batch)
+        shoot_drag_threads(shots, algebra, max_steps, reached, begin, stop)
+        batch = int(np.clip(STEPS_A_BATCH / max(1.0, steps[begin:stop].mean()), LEAST_BATCH, BATCH))
+        begin = stop
     x, y = state[:, 0, 0], state[:, 1, 0]
     # Where no drag takes the cable out of its plane the angle grows by half a turn at every crossing of the axis.
     angle = np.where(y == 0.0, np.pi * turns[:, 1], np.arctan2(y, x) + 2.0 * np.pi * turns[:, 0])
