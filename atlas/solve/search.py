@@ -103,7 +103,7 @@ def search(systems: Array, gamma: Array) -> Found:
 
 class _Search:
     """A block of systems; points are kept sorted by system and x, with X, Y and their slopes over tow radius, log rho
-    and its slope, and the angle of the tow point; nan where a shot failed."""
+    and its slope, and the angle of the tow point; nan where a shot failed; last the steps of the shot."""
 
     def __init__(self, systems: Array, gamma: Array, first: int):
         self.systems, self.gamma, self.first = systems, gamma, first
@@ -130,7 +130,7 @@ class _Search:
         )
 
     def _shoot(self, rows: Integers, x: Array) -> Array:
-        """Values at points; shape (7, points)."""
+        """Values at points; shape (8, points)."""
         ends = shoot(np.exp(x), self.gamma[rows], self.systems[rows], SLOPE)
         np.add.at(self.shots, rows, 1)
         bad = ends.status != status.OK
@@ -146,9 +146,10 @@ class _Search:
                 ends.Y[:, 1] * scale,
                 *ends.log_rho.T,
                 ends.angle,
+                ends.steps,
             ]
         )
-        values[:, bad | ~np.isfinite(values).all(axis=0)] = np.nan
+        values[:-1, bad | ~np.isfinite(values).all(axis=0)] = np.nan
         return values
 
     def _range(self) -> tuple[Array, Array]:
@@ -178,16 +179,9 @@ class _Search:
         x = low + PROBES * (high - low)
         rows = np.repeat(some, len(PROBES))
         ends = shoot(np.exp(x.ravel()), self.gamma[rows], self.systems[rows], SLOPE)
-        steps = ends.steps.reshape(x.shape)
-        turned = np.abs(np.diff(ends.angle.reshape(x.shape), axis=1))
-        shots = EXPECTED_SHOTS / (len(PROBES) - 1.0) + SHOTS_A_RADIAN * np.nan_to_num(turned)
-        total = (shots * 0.5 * (steps[:, 1:] + steps[:, :-1])).sum() * count / len(some)
-        expected = shots.sum() * count / len(some)
-        check_foreseen(
-            total * SECONDS_A_STEP,
-            f"shots with drag of about {total / expected:,.0f} steps, some {float(f'{expected:.2g}'):,.0f} of them",
-            REMEDY,
-        )
+        values = np.stack([ends.angle, ends.steps]).reshape(2, *x.shape)
+        least = np.full((len(some), len(PROBES) - 1), EXPECTED_SHOTS / (len(PROBES) - 1.0))
+        _check_foreseen(values[..., :-1], values[..., 1:], least, count / len(some))
 
     def _first_points(self, low: Array, high: Array) -> tuple[Integers, Array]:
         counts = np.ceil((high - low) / np.log(10.0) * PER_DECADE).astype(np.int64) + 1
@@ -204,10 +198,10 @@ class _Search:
             i = np.flatnonzero(active)
             if not len(i):
                 break
-            middle = 0.5 * (x[i] + x[i + 1])
-            new = self._shoot(rows[i], middle)
-            width = x[i + 1] - x[i]
             a, b = values[:, i], values[:, i + 1]
+            _check_foreseen(a[6:], b[6:], np.ones(len(i)))
+            middle, width = 0.5 * (x[i] + x[i + 1]), x[i + 1] - x[i]
+            new = self._shoot(rows[i], middle)
             # By value and by slope: where the points are too few for what goes on between, one of them may agree by
             # accident.
             middle_slope = 1.5 * (b[:2] - a[:2]) / width - 0.25 * (a[2:4] + b[2:4])
@@ -281,6 +275,18 @@ class _Search:
         rows, x = np.concatenate([rows, peak_row]), np.concatenate([x, peak])
         order = np.lexsort((x, rows))
         return rows[order], x[order], np.concatenate([values[4], height])[order]
+
+
+def _check_foreseen(a: Array, b: Array, least: Array, times: float = 1.0) -> None:
+    """Refuse what would take longer than there is patience for, by angle and steps of shots at both ends of intervals,
+    shape (2, ...); at least so many shots in each, and what takes so many times as long."""
+    shots = np.maximum(least, SHOTS_A_RADIAN * np.nan_to_num(np.abs(b[0] - a[0])))
+    steps, count = float(np.sum(shots * 0.5 * (a[1] + b[1])) * times), float(np.sum(shots) * times)
+    check_foreseen(
+        steps * SECONDS_A_STEP,
+        f"shots with drag of about {steps / max(count, 1.0):,.0f} steps, some {float(f'{count:.2g}'):,.0f} of them",
+        REMEDY,
+    )
 
 
 def _between(a: Array, b: Array, width: Array, t: float | Array) -> Array:
