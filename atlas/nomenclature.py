@@ -129,5 +129,6 @@ _FOLDS_WITH_DRAG = (
     Symbol("C_cusp", "drag constant above which the n-th pair of equilibria never appears", "$C^*_n$", "towatlas"),
     Symbol("appears", "speed at which the n-th pair of equilibria appears", r"$\gamma_{cn}(C)$", "towatlas"),
     Symbol("ends", "speed at which the outer member of the n-th pair is gone", r"$\gamma_{en}(C)$", "towatlas"),
+    Symbol("again", "speed at which the n-th pair, having ended, appears again", r"$\gamma_{an}(C)$", "towatlas"),
 )
 DRAG = SYMBOLS | {symbol.name: symbol for symbol in _FOLDS_WITH_DRAG}

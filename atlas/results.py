@@ -1,6 +1,6 @@
 """What the program answers with. Arrays of one answer have one shape; all numbers are dimensionless unless said."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -181,6 +181,21 @@ class Folds:
     def __len__(self) -> int:
         return len(self.value)
 
+    def part(self, which: Any) -> "Folds":
+        """Some of them.
+
+        Parameters
+        ----------
+        which : ndarray of int or bool
+            Rows.
+
+        Returns
+        -------
+        Folds
+        """
+        columns = ("value", "gamma", "r_f", "shapes_below", "shapes_above", "n", "origin", "error", "status")
+        return replace(self, **{name: getattr(self, name)[which] for name in columns})
+
 
 @dataclass(frozen=True)
 class FishPositions:
@@ -241,18 +256,22 @@ class DragFolds:
         Speed at which the outer member of the pair meets another equilibrium and is gone [-], > `appears`.
     r_f_ends : ndarray, shape (...)
         Distance of the fish from the axis there, over tow radius [-], > 0.
+    again : ndarray, shape (...)
+        Speed at which the pair that had ended appears again [-], > `ends`.
+    r_f_again : ndarray, shape (...)
+        Distance of the fish from the axis there, over tow radius [-], > 0.
     C_cusp : ndarray, shape (...)
         C*_n, the drag constant above which there is no n-th pair [-], > 0.
     gamma_cusp : ndarray, shape (...)
         Speed at the cusp [-], > 0.
     C_lasting : ndarray, shape (...)
-        Drag constant below which the pair does not end, as far as it was looked [-], > 0; nan where looked up.
-    error : ndarray, shape (...)
-        Estimated relative error of `appears` and `ends` [-], > 0.
-    error_cusp : ndarray, shape (...)
-        Estimated relative error of C_cusp [-], > 0.
-    status, status_ends, status_cusp : ndarray of int8, shape (...)
-        Codes of `towatlas.kernels.status` of `appears`, `ends` and `C_cusp`.
+        Drag constant below which the pair does not end, up to the highest speed looked at [-], > 0.
+    error, error_ends, error_again : ndarray, shape (...)
+        Estimated relative errors of `appears`, `ends` and `again` [-], > 0.
+    error_cusp, error_lasting : ndarray, shape (...)
+        Estimated relative errors of C_cusp and C_lasting [-], > 0.
+    status, status_ends, status_again, status_cusp : ndarray of int8, shape (...)
+        Codes of `towatlas.kernels.status` of `appears`, `ends`, `again` and `C_cusp`.
     """
 
     n: Integers
@@ -263,16 +282,22 @@ class DragFolds:
     r_f_appears: Array
     ends: Array
     r_f_ends: Array
+    again: Array
+    r_f_again: Array
     C_cusp: Array
     gamma_cusp: Array
     C_lasting: Array
     error: Array
+    error_ends: Array
+    error_again: Array
     error_cusp: Array
+    error_lasting: Array
     status: NDArray[np.int8]
     status_ends: NDArray[np.int8]
+    status_again: NDArray[np.int8]
     status_cusp: NDArray[np.int8]
 
     def sentence(self, index: Any = (), of: str = "appears") -> str:
-        """The status of one fold in words: of `appears`, of `ends` or of the `cusp`."""
-        column = {"appears": self.status, "ends": self.status_ends, "cusp": self.status_cusp}[of]
+        """The status of one fold in words: of `appears`, `ends`, `again` or of the `cusp`."""
+        column = self.status if of == "appears" else getattr(self, f"status_{of}")
         return codes.SENTENCES[int(column[index])]

@@ -15,6 +15,7 @@ NEAR_FOLD = 8
 NO_PAIR = 9
 NEVER_ENDS = 10
 NO_CUSP = 11
+NOT_AGAIN = 12
 
 SENTENCES = {
     OK: "computed",
@@ -30,10 +31,11 @@ SENTENCES = {
     NO_PAIR: "too much drag: the n-th pair of the vacuum never appears; drag may make others, see towatlas folds",
     NEVER_ENDS: "the pair does not end up to the highest speed looked at",
     NO_CUSP: "no cusp: as the drag rises, the pair appears at ever higher speed, up to the highest looked at",
+    NOT_AGAIN: "the pair does not come again up to the highest speed looked at",
 }
 
 # Names for CF flag_meanings: one word each, in the order of the codes.
 FLAG_MEANINGS = (
     "computed no_transition step_limit not_converged outside_atlas not_found_by_scan bad_input lost_in_rounding "
-    "near_fold no_pair never_ends no_cusp"
+    "near_fold no_pair never_ends no_cusp not_again"
 )

@@ -14,11 +14,13 @@ from helpers import SMALL_GRID, SMALL_SCAN, run
 from tqdm import tqdm
 
 import towatlas
-from towatlas import open_atlas
+from towatlas import TooMuchWork, open_atlas
+from towatlas.builders import drag_folds as drag_builder
 from towatlas.builders import drag_series
 from towatlas.builders.critical import build_atlas
 from towatlas.builders.drag_folds import build_drag
 from towatlas.builders.grids import DragGrid
+from towatlas.commands import critical_drag
 from towatlas.kernels import status
 from towatlas.solve.drag_folds import _cusp_equations, cusp_errors, solve_cusps, solve_drag_folds, trace_folds
 from towatlas.system import System
@@ -35,6 +37,7 @@ TINY = DragGrid(
     series_sigma=8,
     checks=6,
     traced_checks=2,
+    looked=2,
     error_blocks=2,
     w_f=np.array([0.0, 1.0]),
     lam=np.array([12.0, 14.0]),
@@ -128,9 +131,9 @@ def test_where_there_is_none():
 def test_lookup_within_its_error(drag_file):
     table = open_atlas(drag_file[0])
     rng = np.random.default_rng(3)
-    lam, w_f = rng.uniform(12, 14, 6), rng.uniform(0, 1, 6)
+    lam, w_f = rng.uniform(12, 14, 8), rng.uniform(0, 1, 8)
     cusp = table.folds(lam, w_f, 0.0).C_cusp
-    c = cusp * np.array([0.01, 0.3, 0.78, 0.85, 0.95, 2.0])
+    c = cusp * np.array([0.01, 0.3, 0.5, 0.7, 0.78, 0.85, 0.95, 2.0])
     found = table.folds(lam, w_f, c)
     direct = solve_drag_folds(lam, w_f, c)
     np.testing.assert_array_equal(found.status, direct.status)
@@ -139,8 +142,12 @@ def test_lookup_within_its_error(drag_file):
     solved = found.status == status.OK
     assert (np.abs(found.appears / direct.appears - 1) < found.error)[solved].all()
     there = found.status_ends == status.OK
-    assert list(there) == [False, False, True, True, True, False]
-    assert (np.abs(found.ends / direct.ends - 1) < found.error)[there].all()
+    assert list(there) == [False, False, True, True, True, True, True, False]
+    for name in ("status_ends", "status_again", "status_cusp"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(direct, name))
+    assert (np.abs(found.ends / direct.ends - 1) < found.error_ends)[there].all()
+    assert (np.abs(found.r_f_ends / direct.r_f_ends - 1) < 0.02)[there].all()
+    assert (np.abs(found.C_lasting / direct.C_lasting - 1) < found.error_lasting).all()
     # Of a file as small as this; what a real one states is in docs/drag.md.
     assert (found.error[solved] < 2e-3).all()
     assert (found.error_cusp < 0.01).all()
@@ -161,8 +168,59 @@ def test_a_prediction_that_fails_is_traced(monkeypatch):
     monkeypatch.setattr(drag_series, "_traced", counted)
     again = drag_series.fit_series(grid, 1, tqdm(disable=True))
     assert traced == [4, 6]
-    for name in ("gamma", "r_f", "cusp"):
+    for name in ("gamma", "r_f", "C_cusp", "C_by_speed", "r_f_by_speed"):
         np.testing.assert_allclose(getattr(again, name), getattr(predicted, name), rtol=0, atol=1e-7)
+
+
+# A cable whose second pair ends and appears again.
+RETURNING = dataclasses.replace(
+    TINY, n_max=2, lam_min=17.5, lam_max=18.5, w_f_max=0.5, stages=((5, 4),), series_speed=24, looked=1
+)
+CABLE = 17.9, 0.321
+
+
+def test_a_pair_that_appears_again():
+    """Between C of the least drag at which it ends and that at infinite speed; by counting shapes, too."""
+    folds = solve_drag_folds(*CABLE, [0.0255, 0.0265, 0.0275, 0.03], 2)
+    assert list(folds.status_ends) == [status.NEVER_ENDS] + [status.OK] * 3
+    assert list(folds.status_again) == [status.NEVER_ENDS, status.OK, status.OK, status.NOT_AGAIN]
+    assert folds.C_lasting[0] == pytest.approx(0.02595368, rel=1e-6)
+    for C, ends, again in zip((0.0265, 0.0275), folds.ends[1:3], folds.again[1:3], strict=True):
+        all_of_them = towatlas.folds(*CABLE, (0.99 * ends, 1.01 * again), C=C)
+        of_pair = all_of_them.part(all_of_them.n == 2)
+        np.testing.assert_allclose(of_pair.gamma, [ends, again], rtol=1e-11)
+        assert list(of_pair.shapes_above - of_pair.shapes_below) == [-2, 2]
+        count = [len(towatlas.equilibria(*CABLE, g, C=C)) for g in (again * 0.999, again * 1.001)]
+        assert count[1] == count[0] + 2
+
+
+def test_a_table_over_a_pair_that_appears_again(tmp_path, capsys):
+    build(tmp_path / "drag.nc", RETURNING)
+    table = open_atlas(tmp_path / "drag.nc")
+    C = [0.025, 0.0265, 0.027, 0.0275, 0.03, 0.05]
+    found, direct = table.folds(*CABLE, C, 2, outside="nan"), solve_drag_folds(*CABLE, C, 2)
+    for side in ("ends", "again"):
+        codes, right = (getattr(folds, f"status_{side}") for folds in (found, direct))
+        # What the error leaves open is not told.
+        told = codes != status.OUTSIDE
+        np.testing.assert_array_equal(codes[told], right[told])
+        there = codes == status.OK
+        assert there.sum() >= 2
+        wrong = np.abs(getattr(found, side) / getattr(direct, side) - 1)[there]
+        assert (wrong < getattr(found, f"error_{side}")[there]).all()
+    code, out, err = run(
+        capsys, "critical", "--lam", 17.9, "--wf", 0.321, "--C", 0.027, "--atlas", tmp_path / "drag.nc"
+    )
+    assert (code, out.count("vacuum")) == (0, 3)
+    assert "at 1 cables" in err
+
+
+def test_a_table_that_contradicts_the_folds_is_not_built(monkeypatch, tmp_path):
+    found = drag_builder.folds_in_speed
+    monkeypatch.setattr(drag_builder, "folds_in_speed", lambda *args, **more: found(*args, **more).part([]))
+    with pytest.raises(ArithmeticError, match="are not among"):
+        build(tmp_path / "drag.nc")
+    assert not list(tmp_path.iterdir())
 
 
 def test_nothing_is_extrapolated(drag_file):
@@ -242,14 +300,26 @@ def test_cf_compliance(drag_file):
     assert "All tests passed" in done.stdout
 
 
-def test_shell(capsys, drag_file, tmp_path):
+def test_shell(capsys, drag_file, tmp_path, monkeypatch):
     cable = "critical", "--lam", "13", "--wf", "0.5", "--atlas", drag_file[0]
     code, out, _ = run(capsys, *cable, "--C", "0.01", "--n", "1", "--json")
-    (row,) = json.loads(out)
-    assert (code, row["status"]) == (0, "computed")
-    code, out, _ = run(capsys, *cable, "--C", "0.01", "--n", "1", "--solve")
+    answer = json.loads(out)
+    (fold,), (cusp,) = answer["folds"], answer["cusps"]
+    assert (code, fold["status"], fold["n"], fold["change"], cusp["status_ends"]) == (0, "computed", 1, 2, "never_ends")
+    code, out, err = run(capsys, *cable, "--C", "0.01", "--solve")
     assert code == 0
-    assert f"{row['appears']:.3f}"[:4] in out
+    assert f"{fold['gamma']:.3f}"[:4] in out
+    assert "1 to 3" in out
+    assert f"C*_1 = {cusp['C_cusp']:.4f}"[:12] in out
+    assert "all shapes at" in err
+    # What takes too long is said, and the pairs are answered.
+
+    def refuse(*arguments, **more):
+        raise TooMuchWork("too long")
+
+    monkeypatch.setattr(critical_drag, "folds", refuse)
+    code, out, err = run(capsys, *cable, "--C", "0.01", "--solve")
+    assert (code, "+2" in out, "too long" in err) == (0, True, True)
     assert run(capsys, *cable, "--C", "0.01", "--n", "2")[0] == 3
     code, _, err = run(capsys, *cable, "--C", "1", "--n", "1")
     assert code == 4

@@ -1,10 +1,11 @@
 """Series through folds with drag: folds on Chebyshev points, series through them, and what these are wrong by.
 
 The first stage traces curves of folds from the vacuum at a few cables; from the series through them Newton finds the
-folds of all others, at a fraction of the cost.
+folds of all others, at a fraction of the cost. Where pairs end, from about sigma_min on, the drag is found for each of
+some speeds instead, for it changes less and less with them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,17 @@ from towatlas.kernels import status
 from towatlas.numerics.chebyshev import at_points, coefficients, midpoints, nodes, transform
 from towatlas.numerics.curves import Curve
 from towatlas.numerics.errormap import stated_error, worst_of_blocks
-from towatlas.solve.drag_folds import crossing, fold_at, polish_cusps, solve_cusps, trace_folds
+from towatlas.solve.drag_folds import (
+    at_speeds,
+    crossing,
+    fold_at,
+    fold_at_speed,
+    polish_cusps,
+    solve_cusps,
+    trace_folds,
+)
 from towatlas.system import nondense_rows
-from towatlas.tables.drag_folds import DragAxes
+from towatlas.tables.drag_series import DragAxes
 
 Array = NDArray[np.float64]
 
@@ -40,13 +49,17 @@ class Series:
     ----------
     gamma, r_f : ndarray, shape (sigma, w_f, lam)
         Coefficients of log gamma and log r_f.
-    cusp : ndarray, shape (w_f, lam)
+    C_cusp : ndarray, shape (w_f, lam)
         Those of log C*.
+    C_by_speed, r_f_by_speed : ndarray, shape (speed, w_f, lam)
+        Those of log C and log r_f where pairs end.
     """
 
     gamma: Array
     r_f: Array
-    cusp: Array
+    C_cusp: Array
+    C_by_speed: Array
+    r_f_by_speed: Array
 
     def guess(self, at_sigma: float, y: Array, x: Array) -> Array:
         """Folds at one sigma.
@@ -67,6 +80,27 @@ class Series:
         log_gamma = at_points(self.gamma, s, y, x)
         return np.stack([at_points(self.r_f, s, y, x) + 2.0 * log_gamma, log_gamma])
 
+    def guess_by_speed(self, axes: DragAxes, log_gamma: Array, y: Array, x: Array) -> Array:
+        """Folds at given speeds, where pairs end.
+
+        Parameters
+        ----------
+        axes : DragAxes
+        log_gamma : ndarray, shape (points, speeds)
+        y, x : ndarray, shape (points,)
+            Coordinates of w_f and lambda, -1 to 1.
+
+        Returns
+        -------
+        ndarray, shape (points, speeds, 2)
+            log r, log C.
+        """
+        v = axes.speeds(self.gamma, y, x).coordinate(log_gamma)
+        count = v.shape[1]
+        at = v.ravel(), np.repeat(y, count), np.repeat(x, count)
+        log_r_f, log_c = (at_points(series, *at).reshape(v.shape) for series in (self.r_f_by_speed, self.C_by_speed))
+        return np.stack([log_r_f + 2.0 * log_gamma, log_c], axis=2)
+
     def log_cusp(self, y: Array, x: Array) -> Array:
         """Drag constants at the cusp.
 
@@ -80,7 +114,7 @@ class Series:
         ndarray, shape (points,)
             log C*.
         """
-        return at_points(self.cusp[None], np.zeros(len(x)), y, x)
+        return at_points(self.C_cusp[None], np.zeros(len(x)), y, x)
 
 
 @dataclass(frozen=True)
@@ -157,8 +191,8 @@ class Cables:
         return len(self.x)
 
 
-def _traced(cables: Cables, sigma: Array, bar: tqdm) -> tuple[Array, Array]:
-    """log C*, shape (cables,), and log gamma and log r_f of folds, shape (2, cables, sigma), from the vacuum on."""
+def _curves(cables: Cables, bar: tqdm | None = None) -> tuple[list[Curve], Array]:
+    """Curves of folds, from the vacuum on, and their statuses."""
     curves: list[Curve] = []
     statuses = []
     for first in range(0, len(cables), BATCH):
@@ -166,8 +200,16 @@ def _traced(cables: Cables, sigma: Array, bar: tqdm) -> tuple[Array, Array]:
         some, codes = trace_folds(lam=part.lam, w_f=part.w_f, n=np.full(len(part), part.n))
         curves += some
         statuses.append(codes)
-        bar.update(len(part))
-    cusps, codes = solve_cusps(curves, np.concatenate(statuses), lam=cables.lam, w_f=cables.w_f)
+        if bar is not None:
+            bar.update(len(part))
+    return curves, np.concatenate(statuses)
+
+
+def _traced(cables: Cables, sigma: Array, bar: tqdm) -> tuple[Array, Array, list[Curve]]:
+    """log C*, shape (cables,), log gamma and log r_f of folds, shape (2, cables, sigma), from the vacuum on, and the
+    curves of folds."""
+    curves, statuses = _curves(cables, bar)
+    cusps, codes = solve_cusps(curves, statuses, lam=cables.lam, w_f=cables.w_f)
     if (codes != status.OK).any():
         k = int(np.flatnonzero(codes != status.OK)[0])
         raise ArithmeticError(
@@ -177,7 +219,7 @@ def _traced(cables: Cables, sigma: Array, bar: tqdm) -> tuple[Array, Array]:
     guess = np.full((len(cables), len(sigma), 2), np.nan)
     for row, curve in enumerate(curves):
         for k, value in enumerate(sigma):
-            if (found := crossing(curve, log_c[row, k], bool(value > 0.0))) is not None:
+            if (found := crossing(curve, log_c[row, k], "appears" if value > 0.0 else "ends")) is not None:
                 guess[row, k] = found[:2]
     values, solved = _folds(cables, guess, log_c)
     if not solved.all():
@@ -186,7 +228,7 @@ def _traced(cables: Cables, sigma: Array, bar: tqdm) -> tuple[Array, Array]:
             f"n = {cables.n}, lam = {cables.lam[k]:g}, w_f = {cables.w_f[k]:g}: "
             f"the fold at sigma = {sigma[j]:.3g} was not solved"
         )
-    return cusps[:, 2], values
+    return cusps[:, 2], values, curves
 
 
 def _predicted(cables: Cables, series: Series, axes: DragAxes, sigma: Array, bar: tqdm) -> tuple[Array, Array]:
@@ -204,7 +246,7 @@ def _predicted(cables: Cables, series: Series, axes: DragAxes, sigma: Array, bar
     bar.update(len(cables) - len(again))
     log_cusp = cusps[:, 2]
     if len(again):
-        log_cusp[again], values[:, again] = _traced(cables.part(again), sigma, bar)
+        log_cusp[again], values[:, again], _ = _traced(cables.part(again), sigma, bar)
     return log_cusp, values
 
 
@@ -223,27 +265,70 @@ def _folds(cables: Cables, guess: Array, log_c: Array) -> tuple[Array, NDArray[n
     return np.stack([z[:, :, 1], z[:, :, 0] - 2.0 * z[:, :, 1]]), (codes == status.OK).reshape(log_c.shape)
 
 
+def _by_speed(cables: Cables, guess: Array, log_gamma: Array) -> Array:
+    """log C and log r_f where pairs end at given speeds, shape (2, cables, speeds), from guesses of log r and log C.
+
+    Cables of which one is not found, or not near its guess, are traced from the vacuum.
+    """
+    count = log_gamma.shape[1]
+    long = {"lam": np.repeat(cables.lam, count), "w_f": np.repeat(cables.w_f, count)}
+    z, solved = fold_at_speed(guess.reshape(-1, 2), log_gamma.ravel(), **long)
+    z, solved = z.reshape(guess.shape), solved.reshape(log_gamma.shape)
+    again = np.flatnonzero((~solved | (np.abs(z - guess).max(axis=2) > STRAYED)).any(axis=1))
+    if len(again):
+        curves, _ = _curves(cables.part(again))
+        traced = np.stack([at_speeds(curve, log_gamma[k])[:, [0, 2]] for k, curve in zip(again, curves, strict=True)])
+        rows = (again[:, None] * count + np.arange(count)).ravel()
+        found, well = fold_at_speed(
+            traced.reshape(-1, 2), log_gamma.ravel()[rows], **{name: column[rows] for name, column in long.items()}
+        )
+        if not well.all():
+            k, j = divmod(int(rows[np.flatnonzero(~well)[0]]), count)
+            raise ArithmeticError(
+                f"n = {cables.n}, lam = {cables.lam[k]:g}, w_f = {cables.w_f[k]:g}: "
+                f"no end of the pair was found at gamma = {np.exp(log_gamma[k, j]):.6g}"
+            )
+        z[again] = found.reshape(len(again), count, 2)
+    return np.stack([z[:, :, 1], z[:, :, 0] - 2.0 * log_gamma])
+
+
 def fit_series(grid: DragGrid, n: int, bar: tqdm) -> Series:
     """Series of one n: the first stage traced from the vacuum, each other predicted by the one before it."""
     axes = grid.axes
-    sigma = axes.sigma.value(nodes(grid.series_sigma))
+    sigma, v = axes.sigma.value(nodes(grid.series_sigma)), nodes(grid.series_speed)
     traced, *refined = (Cables.grid(axes, n, *(nodes(count) for count in stage)) for stage in grid.stages)
-    series = _through(*_traced(traced, sigma, bar), grid.stages[0])
+    log_cusp, values, curves = _traced(traced, sigma, bar)
+    series = _through(log_cusp, values, grid.stages[0])
+    log_gamma = axes.speeds(series.gamma, traced.y, traced.x).log_gamma(np.tile(v, (len(traced), 1)))
+    guess = np.stack([at_speeds(curve, speeds)[:, [0, 2]] for curve, speeds in zip(curves, log_gamma, strict=True)])
+    series = _with_speeds(series, _by_speed(traced, guess, log_gamma), grid.stages[0])
     for cables, shape in zip(refined, grid.stages[1:], strict=True):
-        series = _through(*_predicted(cables, series, axes, sigma, bar), shape)
+        finer = _through(*_predicted(cables, series, axes, sigma, bar), shape)
+        log_gamma = axes.speeds(finer.gamma, cables.y, cables.x).log_gamma(np.tile(v, (len(cables), 1)))
+        guess = series.guess_by_speed(axes, log_gamma, cables.y, cables.x)
+        series = _with_speeds(finer, _by_speed(cables, guess, log_gamma), shape)
     return series
 
 
 def _through(log_cusp: Array, values: Array, shape: tuple[int, int]) -> Series:
     """Series through log C*, shape (cables,), and log gamma and log r_f, shape (2, cables, sigma), on nodes `shape`."""
-    sigma_nodes = values.shape[-1]
-    plane = coefficients(np.moveaxis(values.reshape(2, *shape, sigma_nodes), -1, 1))
-    fields = np.einsum("ks,fsji->fkji", transform(sigma_nodes), plane, optimize=False)
-    return Series(fields[0], fields[1], coefficients(log_cusp.reshape(shape)))
+    none = np.empty((0, *shape))
+    return Series(*_coefficients(values, shape), coefficients(log_cusp.reshape(shape)), none, none)
 
 
-def measure_errors(grid: DragGrid, n: int, series: Series, bar: tqdm) -> tuple[Array, Array]:
-    """Relative errors of gamma at given C, and of C*, in blocks of the coordinates of w_f and lambda.
+def _with_speeds(series: Series, values: Array, shape: tuple[int, int]) -> Series:
+    """The same with those by speed, through log C and log r_f, shape (2, cables, speeds)."""
+    log_c, log_r_f = _coefficients(values, shape)
+    return replace(series, C_by_speed=log_c, r_f_by_speed=log_r_f)
+
+
+def _coefficients(values: Array, shape: tuple[int, int]) -> Array:
+    plane = coefficients(np.moveaxis(values.reshape(len(values), *shape, -1), -1, 1))
+    return np.einsum("ks,fsji->fkji", transform(values.shape[-1]), plane, optimize=False)
+
+
+def measure_errors(grid: DragGrid, n: int, series: Series, bar: tqdm) -> tuple[Array, ...]:
+    """Relative errors of gamma at given C, of C*, and of C at given gamma, in blocks of w_f and lambda.
 
     From cables spread over the domain, some of them traced from the vacuum and so independent of the series.
     """
@@ -257,7 +342,7 @@ def measure_errors(grid: DragGrid, n: int, series: Series, bar: tqdm) -> tuple[A
     sigma = sigma[np.abs(sigma) > NEAR_CUSP]
     traced = np.arange(grid.checks) % max(grid.checks // grid.traced_checks, 1) == 0
     log_cusp, log_gamma = np.empty(len(cables)), np.empty((len(cables), len(sigma)))
-    log_cusp[traced], (log_gamma[traced], _) = _traced(cables.part(traced), sigma, bar)
+    log_cusp[traced], (log_gamma[traced], _), curves = _traced(cables.part(traced), sigma, bar)
     log_cusp[~traced], (log_gamma[~traced], _) = _predicted(cables.part(~traced), series, axes, sigma, bar)
     moved = log_cusp - series.log_cusp(y, x)
     wrong = np.zeros(len(cables))
@@ -265,7 +350,13 @@ def measure_errors(grid: DragGrid, n: int, series: Series, bar: tqdm) -> tuple[A
         # The drag is what is asked for: an error of C* moves the place on the curve.
         there = np.sign(value) * np.sqrt(np.maximum(1.0 - (1.0 - value * value) * np.exp(moved), 0.0))
         wrong = np.maximum(wrong, np.abs(at_points(series.gamma, axes.sigma.coordinate(there), y, x) - log_gamma[:, j]))
-    error, cusp_error = (
-        stated_error(worst_of_blocks(measured, y, x, grid.error_blocks)) for measured in (wrong, np.abs(moved))
+    at = axes.speeds(series.gamma, y, x).log_gamma(np.tile(midpoints(grid.series_speed), (len(cables), 1)))
+    guess = series.guess_by_speed(axes, at, y, x)
+    said = guess[:, :, 1].copy()
+    for k, curve in zip(np.flatnonzero(traced), curves, strict=True):
+        guess[k] = at_speeds(curve, at[k])[:, [0, 2]]
+    wrong_by_speed = np.abs(_by_speed(cables, guess, at)[0] - said).max(axis=1)
+    return tuple(
+        stated_error(worst_of_blocks(measured, y, x, grid.error_blocks))
+        for measured in (wrong, np.abs(moved), wrong_by_speed)
     )
-    return error, cusp_error

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from towatlas.tables.drag_folds import DragAxes
+from towatlas.tables.drag_series import DragAxes
 
 Array = NDArray[np.float64]
 
@@ -149,16 +149,22 @@ class DragGrid:
     w_f_max : float
         Heaviest fish [-], > 0.
     sigma_min : float
-        Where the series end beyond the cusp [-], -1 to 0.
+        Where the series in the drag end beyond the cusp, and those in the speed begin [-], -1 to 0.
+    gamma_max : float
+        The highest speed at which the end of a pair is held [-], > 0; no more than curves are followed to.
     stages : tuple of (int, int)
         Nodes in w_f and lambda of the cables traced, and of the series that follow, each predicted by the one before;
         the last is kept.
     series_sigma : int
         Nodes in sigma, none of them next to the cusp at 0.
+    series_speed : int
+        Nodes in the speed at which a pair ends, up to gamma_max.
     checks : int
         Cables between the nodes for the error.
     traced_checks : int
         How many of those are traced from the vacuum.
+    looked : int
+        Cables at which all folds are looked for, with a drag each, to see which are not of these pairs.
     error_blocks : int
         Blocks of the error along each axis.
     w_f, lam, C : ndarray
@@ -170,10 +176,13 @@ class DragGrid:
     lam_max: float = 60.0
     w_f_max: float = 2000.0
     sigma_min: float = -0.5
+    gamma_max: float = 50.0
     stages: tuple[tuple[int, int], ...] = ((9, 4), (29, 11))
     series_sigma: int = 15
+    series_speed: int = 32
     checks: int = 160
     traced_checks: int = 5
+    looked: int = 12
     error_blocks: int = 6
     w_f: Array = field(default_factory=lambda: np.concatenate([[0.0], 10.0 ** np.linspace(-1.0, 3.25, 18)]))
     lam: Array = field(default_factory=lambda: np.geomspace(16.0, 60.0, 14))
@@ -182,7 +191,7 @@ class DragGrid:
     @property
     def axes(self) -> DragAxes:
         """The domain of the series."""
-        return DragAxes(self.lam_min, self.lam_max, self.w_f_max, self.sigma_min)
+        return DragAxes(self.lam_min, self.lam_max, self.w_f_max, self.sigma_min, self.gamma_max)
 
     @property
     def size(self) -> int:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from towatlas.commands import critical_drag
 from towatlas.commands.common import (
     FAILED,
     NO_STATE,
@@ -22,15 +23,12 @@ from towatlas.commands.common import (
 from towatlas.kernels import status
 from towatlas.limits import transitions, unchecked_threshold_length
 from towatlas.nomenclature import REPORT
-from towatlas.results import CriticalStates, DragFolds
+from towatlas.results import CriticalStates
 from towatlas.solve.critical import solve_critical
-from towatlas.solve.drag_folds import solve_drag_folds
 from towatlas.tables.atlas import Atlas, open_atlas
 
 # Transitions solved at once when none is named; a cable of 1e4 tow radii has 5000.
 MOST_SOLVED = 1000
-# Transitions with drag that are answered when none is named.
-MOST_WITH_DRAG = 3
 
 
 def add(commands: Any) -> None:
@@ -47,14 +45,14 @@ def add(commands: Any) -> None:
         "--C",
         type=drag,
         metavar="C",
-        help="with drag: its constant (1/2) rho C_D d R / (mu + rho A); from an atlas made by "
-        "`towatlas build --drag`, or solved with --solve",
+        help="with drag: its constant (1/2) rho C_D d R / (mu + rho A); where the pairs of the vacuum appear and end, "
+        "from an atlas made by `towatlas build --drag`, or with --solve these and all other jumps between them",
     )
     add_atlas(parser)
     parser.add_argument(
         "--solve", action="store_true", help="solve directly instead of looking up: any n, any length, no atlas needed"
     )
-    parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
+    parser.add_argument("--json", action="store_true", help="JSON instead of a table")
     add_patience(parser)
     parser.set_defaults(run=_run)
 
@@ -62,7 +60,7 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     lam, w_f = options.lam, options.wf
     if options.C is not None:
-        return _run_drag(options)
+        return critical_drag.run(options)
     existing = transitions(lam=lam, w_f=w_f)
     atlas = None if options.solve else open_atlas(options.atlas)
     limit = MOST_SOLVED if atlas is None else atlas.critical.n_max
@@ -75,43 +73,6 @@ def _run(options: argparse.Namespace) -> int:
     rows = _rows(states)
     print_json(rows) if options.json else print(_as_table(rows), end="")
     return _verdict(states, lam=lam, w_f=w_f, atlas=atlas)
-
-
-def _run_drag(options: argparse.Namespace) -> int:
-    """Where pairs of equilibria appear and end with drag."""
-    existing = transitions(lam=options.lam, w_f=options.wf)
-    orders = np.arange(1, min(existing, MOST_WITH_DRAG) + 1) if options.n is None else np.array([options.n])
-    cable = options.lam, options.wf, options.C, orders
-    if options.solve:
-        folds: DragFolds = solve_drag_folds(*cable)
-    else:
-        folds = open_atlas(options.atlas).folds(*cable, outside="nan")
-    words = status.FLAG_MEANINGS.split()
-    names = ("appears", "ends", "C_cusp", "error", "error_cusp")
-    rows = [
-        {"n": int(n)}
-        | {name: real(getattr(folds, name)[k]) for name in names}
-        | {"status": words[int(folds.status[k])], "status_ends": words[int(folds.status_ends[k])]}
-        for k, n in enumerate(orders)
-    ]
-    if options.json:
-        print_json(rows)
-    elif rows:
-        print(f"{'n':>4} {'appears':>20} {'ends':>20} {'C*_n':>14} {'error':>8}  status, of ends")
-        for row in rows:
-            cells = " ".join(f"{'-' if row[k] is None else format(row[k], '.13g'):>20}" for k in ("appears", "ends"))
-            cusp, error = (
-                "-" if row[k] is None else format(row[k], f) for k, f in (("C_cusp", ".8g"), ("error", ".1e"))
-            )
-            print(f"{row['n']:>4} {cells} {cusp:>14} {error:>8}  {row['status']}, {row['status_ends']}")
-    codes = folds.status
-    if (codes == status.OK).any():
-        return OK
-    if (codes == status.OUTSIDE).any():
-        say("outside the folds with drag of the atlas; --solve computes such points directly")
-        return OUTSIDE
-    say(f"no pair: {status.SENTENCES[int(codes[0])] if len(codes) else status.SENTENCES[status.NO_TRANSITION]}")
-    return NO_STATE if not len(codes) or (codes != status.NOT_CONVERGED).any() else FAILED
 
 
 def _verdict(states: CriticalStates, *, lam: float, w_f: float, atlas: Atlas | None) -> int:

@@ -45,21 +45,32 @@ def _span(text: str) -> tuple[float, float]:
 
 def _run(options: argparse.Namespace) -> int:
     found = folds(options.lam, options.wf, options.gamma, **fluid(options))
-    rows = [_row(found, k) for k in range(len(found))]
-    if options.json:
-        print_json(rows)
-    else:
-        _print_table(rows)
+    rows = [row_of(found, k) for k in range(len(found))]
+    print_json(rows) if options.json else print_folds(rows)
     say(f"looked at: {found.searched}")
     return OK if found.complete else FAILED
 
 
-def _row(found: Folds, k: int) -> dict[str, Any]:
+def row_of(found: Folds, k: int) -> dict[str, Any]:
+    """One fold as an object of JSON.
+
+    Parameters
+    ----------
+    found : Folds
+        In speed.
+    k : int
+
+    Returns
+    -------
+    dict
+    """
+    below, above = int(found.shapes_below[k]), int(found.shapes_above[k])
     return {
         "gamma": float(found.gamma[k]),
         "r_f": float(found.r_f[k]),
-        "shapes_below": int(found.shapes_below[k]),
-        "shapes_above": int(found.shapes_above[k]),
+        "shapes_below": below,
+        "shapes_above": above,
+        "change": above - below,
         "n": int(found.n[k]) or None,
         "origin": str(found.origin[k]),
         "error": real(found.error[k]),
@@ -67,10 +78,18 @@ def _row(found: Folds, k: int) -> dict[str, Any]:
     }
 
 
-def _print_table(rows: list[dict[str, Any]]) -> None:
+def print_folds(rows: list[dict[str, Any]]) -> None:
+    """Print folds as a table.
+
+    Parameters
+    ----------
+    rows : list of dict
+        As from `row_of`; shapes_below and shapes_above may be None.
+    """
     print(f"{'gamma':>20} {'r_f':>20} {'shapes':>9} {'n':>5} {'origin':>7} {'error':>8}")
     for row in rows:
-        shapes = f"{row['shapes_below']} to {row['shapes_above']}"
+        known = row["shapes_below"] is not None
+        shapes = f"{row['shapes_below']} to {row['shapes_above']}" if known else f"{row['change']:+d}"
         print(
             f"{row['gamma']:>20.13g} {row['r_f']:>20.13g} {shapes:>9} {row['n'] or '-':>5} {row['origin']:>7} "
             f"{row['error']:>8.1e}"

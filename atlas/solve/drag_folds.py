@@ -5,7 +5,8 @@ log rho = 0 and its slope in log r_f is 0. From the n-th fold of the vacuum a cu
 C). Along it C rises to the cusp, C*_n, where the second slope vanishes too, and falls again. Before the cusp the
 extremum is a maximum: as gamma passes it, two equilibria appear. After it, a minimum: the outer of the two meets the
 next equilibrium outside and both are gone, so that a cable that sat there has to jump. A pair that meets no minimum up
-to GAMMA_MAX does not end: such are all pairs of the vacuum.
+to GAMMA_MAX does not end: such are all pairs of the vacuum. Towards high speed C settles, for weight no longer matters;
+where it comes to that from below, the pair of a drag in between ends and appears again.
 """
 
 from typing import Any
@@ -18,6 +19,7 @@ from towatlas.effort import patience
 from towatlas.kernels import status
 from towatlas.limits import unchecked_excess_length
 from towatlas.numerics.curves import Curve, Steps, follow
+from towatlas.numerics.hermite import cubic
 from towatlas.numerics.rows import EPS, newton, solve_systems
 from towatlas.results import DragFolds
 from towatlas.solve.critical import solve_rows
@@ -28,6 +30,7 @@ from towatlas.system import System, nondense_rows
 
 FOLD = jets_of(2, gamma=True, parameter=True)
 AT_DRAG = jets_of(2, gamma=True)
+AT_SPEED = jets_of(2, parameter=True)
 CUSP = jets_of(3, gamma=True, parameter=True)
 
 # The number that the parameter moves, by its logarithm.
@@ -42,12 +45,17 @@ STEPS = Steps(first=2.0, longest=2.0, shortest=1e-4)
 ROUNDS = 12
 ROUNDINGS = 64.0
 SETTLED = 1e-11
+# Points between two of a curve at which its cubic is looked at.
+FINE = 64
+SIDES = ("appears", "ends", "again")
+# Distances in log gamma of the speeds between which the least drag is found, one after the other.
+LEAST_SPREAD = (0.05, 0.02, 0.005)
 
 Booleans = NDArray[np.bool_]
 
 
 def trace_folds(*, lam: Array, w_f: Array, n: Integers) -> tuple[list[Curve], Integers]:
-    """Curves of folds of the rows given, from the vacuum over the cusp to the highest speed or the next turn of C.
+    """Curves of folds of the rows given, from the vacuum over the cusp to the highest speed or the next cusp.
 
     Parameters
     ----------
@@ -69,6 +77,7 @@ def trace_folds(*, lam: Array, w_f: Array, n: Integers) -> tuple[list[Curve], In
         gamma = vacuum["gamma"]
         start = np.log(np.stack([np.abs(vacuum["x_f"]) * gamma**2, gamma, np.full(len(n), FAINT)], axis=1))
     turned = np.zeros(len(n), bool)
+    densest = np.full(len(n), -np.inf)
 
     def equations(z: Array, i: Integers) -> tuple[Array, Array, Array, Booleans]:
         systems = nondense_rows(lam=lam[i], w_f=w_f[i], C=np.exp(z[:, 2]))
@@ -83,7 +92,10 @@ def trace_folds(*, lam: Array, w_f: Array, n: Integers) -> tuple[list[Curve], In
 
     def stop(z: Array, direction: Array, second: Array, i: Integers) -> Booleans:
         turned[i] |= second[:, 0] > 0.0
-        return (z[:, 1] > np.log(GAMMA_MAX)) | turned[i] & (direction[:, 2] > 0.0) & (second[:, 0] > 1.0)
+        densest[i] = np.maximum(densest[i], z[:, 2])
+        # A pair that comes again does so at less drag than at the cusp.
+        left = (second[:, 0] < 0.0) | (direction[:, 2] > 0.0) & (second[:, 0] > 1.0) & (z[:, 2] >= densest[i])
+        return (z[:, 1] > np.log(GAMMA_MAX)) | turned[i] & left
 
     curves = follow(equations, start, np.tile([0.0, 0.0, 1.0], (len(n), 1)), stop, STEPS)
     complete = np.array([curve.complete for curve in curves], bool)
@@ -173,7 +185,7 @@ def _cusp_equations(z: Array, *, lam: Array, w_f: Array) -> tuple[Array, Array]:
     return jet[:, [at(k, 0, 0) for k in range(3)]], np.stack([np.stack(row, axis=1) for row in along], axis=1)
 
 
-def crossing(curve: Curve, log_c: float, before: bool) -> Array | None:
+def crossing(curve: Curve, log_c: float, side: str) -> Array | None:
     """First point of a curve with a drag constant.
 
     Parameters
@@ -182,33 +194,71 @@ def crossing(curve: Curve, log_c: float, before: bool) -> Array | None:
         From `trace_folds`.
     log_c : float
         Logarithm of the drag constant.
-    before : bool
-        Before the cusp, where the pair appears; else after it, where it ends.
+    side : {"appears", "ends", "again"}
+        Before the cusp, where the drag rises along the curve; after it, where it falls; after that, where it rises.
 
     Returns
     -------
     ndarray, shape (3,), or None
         log r, log gamma, log C; None if there is none.
     """
-    last = curve.event()
-    heights = curve.points[:, 2] - log_c
-    if before and heights[0] >= 0.0:
+    rises = side != "ends"
+    points = _fine(curve, before=side == "appears")
+    if side == "appears" and len(points) and points[0, 2] >= log_c:
         return curve.points[0].copy()
-    if last < 0:
-        last = len(heights) if before else len(heights) - 1
-    span = range(min(last + 1, len(heights) - 1)) if before else range(last, len(heights) - 1)
-    for k in span:
-        end = float(curve.at_event(last)[2]) - log_c if before and k == last else heights[k + 1]
-        begin = float(curve.at_event(last)[2]) - log_c if not before and k == last else heights[k]
-        if (begin < 0.0 <= end) if before else (begin > 0.0 >= end):
-            shares = np.linspace(0.0, 1.0, 65)
-            line = np.array([curve.between(k, share)[2] for share in shares]) - log_c
-            sign = (line[:-1] < 0.0) & (line[1:] >= 0.0) if before else (line[:-1] > 0.0) & (line[1:] <= 0.0)
-            hits = np.flatnonzero(sign)
-            j = int(hits[0]) if len(hits) else int(np.argmin(np.abs(line[:-1])))
-            gap = line[j] - line[j + 1]
-            return curve.between(k, shares[j] + (line[j] / gap / 64.0 if len(hits) else 0.0))
-    return None
+    heights = points[:, 2] - log_c
+    if side == "again" and len(heights):
+        heights[: int(np.argmin(heights))] = np.inf
+    with np.errstate(invalid="ignore"):
+        hits = np.flatnonzero(
+            (heights[:-1] < 0.0) & (heights[1:] >= 0.0) if rises else (heights[:-1] > 0.0) & (heights[1:] <= 0.0)
+        )
+    if not len(hits):
+        return None
+    k = int(hits[0])
+    return points[k] + (points[k + 1] - points[k]) * heights[k] / (heights[k] - heights[k + 1])
+
+
+def at_speeds(curve: Curve, log_gamma: Array) -> Array:
+    """Points of a curve after its cusp with given speeds; nan where there are none.
+
+    Parameters
+    ----------
+    curve : Curve
+        From `trace_folds`.
+    log_gamma : ndarray, shape (speeds,)
+
+    Returns
+    -------
+    ndarray, shape (speeds, 3)
+        log r, log gamma, log C.
+    """
+    return _at_speeds(_fine(curve, before=False), log_gamma)
+
+
+def _at_speeds(points: Array, log_gamma: Array) -> Array:
+    if not len(points):
+        return np.full((len(log_gamma), 3), np.nan)
+    # At the cusp itself the speed stands still.
+    falls = np.flatnonzero(np.diff(points[:, 1]) <= 0.0)
+    points = points[falls[-1] + 1 :] if len(falls) else points
+    columns = [np.interp(log_gamma, points[:, 1], column, np.nan, np.nan) for column in points.T]
+    return np.stack(columns, axis=1)
+
+
+def _fine(curve: Curve, before: bool) -> Array:
+    """A curve up to its cusp, or from there on, on FINE points for each of its own; shape (points, 3)."""
+    last = curve.event()
+    count = len(curve)
+    if (not before and last < 0) or count < 2:
+        return np.empty((0, 3))
+    cusp = last + curve.share(last) if last >= 0 else count - 1.0
+    first, end = (0.0, cusp) if before else (cusp, count - 1.0)
+    places = np.unique(np.concatenate([[first, end], np.arange(np.ceil(first * FINE), end * FINE) / FINE]))
+    k = np.minimum(places.astype(np.int64), count - 2)
+    a, b = curve.points[k], curve.points[k + 1]
+    length, share = np.linalg.norm(b - a, axis=1)[:, None], (places - k)[:, None]
+    return cubic(a, b, curve.tangents[k], curve.tangents[k + 1], length, share)
 
 
 def fold_at(guess: Array, systems: Array, *, settled_at: float = SETTLED) -> tuple[Array, Array, Integers]:
@@ -256,6 +306,44 @@ def fold_at(guess: Array, systems: Array, *, settled_at: float = SETTLED) -> tup
     z, step, solved = newton(residuals, guess, rounds=3 * ROUNDS, longest=1.0, settled=settled)
     error = np.where(solved, np.abs(step[:, 1]) + ROUNDINGS * EPS / np.abs(along_gamma), np.nan)
     return z, error, np.where(solved, status.OK, status.NOT_CONVERGED)
+
+
+def fold_at_speed(guess: Array, log_gamma: Array, *, lam: Array, w_f: Array) -> tuple[Array, Booleans]:
+    """Folds of cables at given speeds near guesses, with the drag among the unknowns, by Newton.
+
+    Parameters
+    ----------
+    guess : ndarray, shape (rows, 2)
+        log r and log C; rows with a nan are passed over.
+    log_gamma, lam, w_f : ndarray, shape (rows,)
+        Logarithm of the speed, cable length and fish weight.
+
+    Returns
+    -------
+    ndarray, shape (rows, 2)
+        log r, log C.
+    ndarray of bool, shape (rows,)
+        Which were solved.
+    """
+    at = AT_SPEED.at
+
+    def residuals(z: Array, i: Integers) -> tuple[Array, Array, Booleans]:
+        systems = nondense_rows(lam=lam[i], w_f=w_f[i], C=np.exp(z[:, 1]))
+        ends = shoot(np.exp(z[:, 0]), np.exp(log_gamma[i]), systems, AT_SPEED, directions=direction_of(DRAG, systems))
+        jet = ends.log_rho
+        sound = (ends.status == status.OK) & np.isfinite(jet).all(axis=1)
+        entries = (jet[:, at(1, 0, 0)], jet[:, at(0, 0, 1)], 2.0 * jet[:, at(2, 0, 0)], jet[:, at(1, 0, 1)])
+        return (
+            np.stack([jet[:, 0], jet[:, at(1, 0, 0)]], axis=1),
+            np.stack(entries, axis=1).reshape(-1, 2, 2),
+            sound,
+        )
+
+    def settled(step: Array, size: Array, last: Array) -> Booleans:
+        return (size < SETTLED) | (np.abs(step[:, 1]) < SETTLED) & (size < 1e-4)
+
+    z, _, solved = newton(residuals, guess, rounds=3 * ROUNDS, longest=1.0, settled=settled)
+    return z, solved
 
 
 def solve_drag_folds(lam: ArrayLike, w_f: ArrayLike, C: ArrayLike, n: ArrayLike = 1) -> DragFolds:
@@ -320,53 +408,84 @@ def _fold_rows(*, lam: Array, w_f: Array, n: Integers, which: Integers, c: Array
     curves, traced = trace_folds(lam=lam, w_f=w_f, n=n)
     cusps, cusp_codes = solve_cusps(curves, traced, lam=lam, w_f=w_f)
     cusp_error = cusp_errors(cusps, lam=lam, w_f=w_f)
-    lasting = np.array([curve.points[-1, 2] if len(curve) and curve.complete else np.nan for curve in curves])
+    lasting, lasting_error = _lasting(curves, lam=lam, w_f=w_f)
     vacuum = solve_rows(lam=lam, w_f=w_f, n=n, excess=unchecked_excess_length(lam=lam, w_f=w_f, n=n))
     with np.errstate(divide="ignore"):
         log_c = np.log(c)
     systems = nondense_rows(lam=lam[which], w_f=w_f[which], C=np.exp(log_c))
     sides = {}
-    for before in (True, False):
+    for side, without in zip(SIDES, (status.NO_PAIR, status.NEVER_ENDS, status.NOT_AGAIN), strict=True):
         guess = np.full((len(c), 2), np.nan)
-        codes = np.full(len(c), status.NO_PAIR if before else status.NEVER_ENDS)
+        codes = np.full(len(c), without)
         for row, cable in enumerate(which):
             curve, cusp_code = curves[cable], cusp_codes[cable]
             if cusp_code not in (status.OK, status.NO_CUSP):
                 codes[row] = cusp_code
-            elif log_c[row] >= cusps[cable, 2]:
+            elif log_c[row] >= cusps[cable, 2] or (cusp_code == status.NO_CUSP and log_c[row] >= lasting[cable]):
                 codes[row] = status.NO_PAIR
-            elif (found := crossing(curve, log_c[row], before)) is not None and np.isfinite(log_c[row]):
+            elif np.isfinite(log_c[row]) and (found := crossing(curve, log_c[row], side)) is not None:
                 guess[row], codes[row] = found[:2], status.OK
-            elif not before and cusp_code == status.NO_CUSP:
-                codes[row] = status.NEVER_ENDS if log_c[row] < curve.points[-1, 2] else status.NO_PAIR
-            elif not curve.complete if not before else np.isfinite(log_c[row]):
+            elif not curve.complete or (side == "appears" and np.isfinite(log_c[row])):
                 codes[row] = status.NOT_CONVERGED
         z, error, solved = fold_at(guess, systems)
         tried = np.isfinite(guess).all(axis=1)
-        sides[before] = np.exp(z[:, 1]), np.exp(z[:, 0] - 2.0 * z[:, 1]), error, np.where(tried, solved, codes)
-    appears, r_f, error, codes = (column.copy() for column in sides[True])
+        sides[side] = [np.exp(z[:, 1]), np.exp(z[:, 0] - 2.0 * z[:, 1]), error, np.where(tried, solved, codes)]
     still = np.asarray((c == 0.0) & (vacuum["status"][which] == status.OK))
-    for column, name in ((appears, "gamma"), (r_f, "x_f"), (error, "error")):
+    for column, name in zip(sides["appears"], ("gamma", "x_f", "error"), strict=False):
         column[still] = np.abs(vacuum[name][which])[still]
-    codes[still] = status.OK
-    table = {
-        "appears": appears,
-        "r_f_appears": r_f,
-        "ends": sides[False][0],
-        "r_f_ends": sides[False][1],
+    table: dict[str, NDArray[Any]] = {}
+    for side, without in zip(SIDES, (status.OK, status.NEVER_ENDS, status.NEVER_ENDS), strict=True):
+        table[side], table[f"r_f_{side}"], error, codes = sides[side]
+        table["error" if side == "appears" else f"error_{side}"] = error
+        codes[still] = without
+        table["status" if side == "appears" else f"status_{side}"] = codes.astype(np.int8)
+    table["status_again"] = np.where(
+        table["status_ends"] == status.OK, table["status_again"], table["status_ends"]
+    ).astype(np.int8)
+    table |= {
         "C_cusp": np.exp(cusps[which, 2]),
         "gamma_cusp": np.exp(cusps[which, 1]),
         "C_lasting": np.exp(lasting[which]),
-        "error": np.fmax(error, sides[False][2]),
         "error_cusp": cusp_error[which],
-        "status": codes.astype(np.int8),
-        "status_ends": np.where(still, status.NEVER_ENDS, sides[False][3]).astype(np.int8),
+        "error_lasting": lasting_error[which],
         "status_cusp": cusp_codes[which].astype(np.int8),
     }
-    lost = (table["status"] == status.NOT_CONVERGED) | (table["status_ends"] == status.NOT_CONVERGED)
+    lost = np.any([table[name] == status.NOT_CONVERGED for name in ("status", "status_ends", "status_again")], axis=0)
     for k in np.flatnonzero(lost & (vacuum["status"][which] == status.OK)):
         _look(table, int(k), systems[k], int(n[which[k]]), float(vacuum["gamma"][which[k]]))
     return table
+
+
+def _lasting(curves: list[Curve], *, lam: Array, w_f: Array) -> tuple[Array, Array]:
+    """log C below which pairs do not end, and its errors: the least after the cusp, or that at the highest speed."""
+    rows = len(curves)
+    best, error, at = np.full(rows, np.nan), np.full(rows, np.nan), np.full((rows, 2), np.nan)
+    highest = np.log(GAMMA_MAX)
+    for row, curve in enumerate(curves):
+        if len(curve) and curve.complete:
+            points = _fine(curve, before=curve.event() < 0)
+            k = int(np.argmin(points[:, 2])) if curve.event() >= 0 else len(points) - 1
+            # The last point lies beyond the highest speed.
+            place = points[k] if points[k, 1] < highest else _at_speeds(points, np.array([highest]))[0]
+            at[row], best[row] = place[[1, 0]], place[2]
+    inside = at[:, 0] < highest - LEAST_SPREAD[0]
+    for spread in LEAST_SPREAD:
+        # A parabola through three speeds: its vertex is wrong by the square of their distance, its value by the fourth.
+        speeds = at[:, :1] + spread * np.where(inside[:, None], np.array([-1.0, 0.0, 1.0]), 0.0)
+        # The fish stays where it is, in tow radii.
+        log_r = at[:, 1:] + 2.0 * (speeds - at[:, :1])
+        guess = np.stack([log_r.ravel(), np.repeat(best, 3)], axis=1)
+        long = {"lam": np.repeat(lam, 3), "w_f": np.repeat(w_f, 3)}
+        z, solved = fold_at_speed(guess, speeds.ravel(), **long)
+        z = np.where(solved[:, None], z, np.nan).reshape(rows, 3, 2)
+        left, middle, right = z[:, :, 1].T
+        slope, bend = 0.5 * (right - left), left - 2.0 * middle + right
+        with np.errstate(divide="ignore", invalid="ignore"):
+            least = np.where(inside, middle - 0.5 * slope**2 / bend, middle)
+            moved = np.where(inside, np.clip(-slope / bend, -1.0, 1.0) * spread, 0.0)
+        error = np.abs(least - best) + ROUNDINGS * EPS
+        best, at = least, np.stack([at[:, 0] + moved, z[:, 1, 0] + 2.0 * moved], axis=1)
+    return best, error
 
 
 def _look(table: dict[str, NDArray[Any]], row: int, system: Array, n: int, gamma: float) -> None:
@@ -374,14 +493,18 @@ def _look(table: dict[str, NDArray[Any]], row: int, system: Array, n: int, gamma
     found = folds_in_speed(System(*system.tolist()), SLOWER * gamma, GAMMA_MAX)
     if not found.complete:
         return
-    for name, wanted, rises in (("appears", "", True), ("ends", "_ends", False)):
-        of_pair = np.flatnonzero((found.n == n) & ((found.shapes_above > found.shapes_below) == rises))
-        there = len(of_pair) > 0
-        k = int(of_pair[0 if rises else -1]) if there else 0
-        table[name][row] = found.gamma[k] if there else np.nan
-        table[f"r_f_{name}"][row] = found.r_f[k] if there else np.nan
-        table[f"status{wanted}"][row] = status.OK if there else status.NO_PAIR if rises else status.NEVER_ENDS
-        if there:
-            table["error"][row] = np.fmax(table["error"][row], found.error[k])
-    if table["status"][row] == status.NO_PAIR:
-        table["status_ends"][row] = status.NO_PAIR
+    rises = found.shapes_above > found.shapes_below
+    of_pair = np.flatnonzero(found.n == n)
+    appears, falls = of_pair[rises[of_pair]], of_pair[~rises[of_pair]]
+    places = {"appears": appears[:1], "ends": falls[:1], "again": appears[1:2]}
+    before = status.OK
+    for side, without in zip(SIDES, (status.NO_PAIR, status.NEVER_ENDS, status.NOT_AGAIN), strict=True):
+        suffix = "" if side == "appears" else f"_{side}"
+        there = len(places[side]) > 0
+        k = int(places[side][0]) if there else 0
+        table[side][row] = found.gamma[k] if there else np.nan
+        table[f"r_f_{side}"][row] = found.r_f[k] if there else np.nan
+        table[f"error{suffix}"][row] = found.error[k] if there else np.nan
+        # What never begins, or ends, has nothing after it.
+        table[f"status{suffix}"][row] = status.OK if there else without if before == status.OK else before
+        before = int(table[f"status{suffix}"][row])
