@@ -146,16 +146,27 @@ def test_files_that_are_no_atlas(small_path, tmp_path):
         towatlas.open_atlas(tmp_path / "absent.nc")
 
 
-def test_newer_schema_is_refused(small_path, tmp_path):
-    path = tmp_path / "newer.nc"
-    shutil.copy(small_path, path)
+def _changed(source, path, change):
+    """A sealed copy of a file that `change` was let at."""
+    shutil.copy(source, path)
     with netCDF4.Dataset(path, "a") as file:
-        file.schema_version = np.int32(99)
+        change(file)
     data = path.read_bytes()
     at = data.index(b"towatlas-sha256:") + 16
     path.write_bytes(data[:at] + b"0" * 64 + data[at + 64 :])
     write_seal(path)
+    return path
+
+
+def test_newer_schema_is_refused(small_path, tmp_path):
+    path = _changed(small_path, tmp_path / "newer.nc", lambda file: file.setncattr("schema_version", np.int32(99)))
     with pytest.raises(AtlasFileError, match="schema version 99, this towatlas reads up to 1; upgrade"):
+        towatlas.open_atlas(path)
+
+
+def test_a_file_that_lacks_what_is_read_is_to_be_built_again(small_path, tmp_path):
+    path = _changed(small_path, tmp_path / "other.nc", lambda file: file.createGroup("support/drag"))
+    with pytest.raises(AtlasFileError, match=r"another version of towatlas.*build it again"):
         towatlas.open_atlas(path)
 
 

@@ -165,10 +165,11 @@ def _plain_tables(grid: DragGrid, series: DragSeries) -> xr.Dataset:
     axes = grid.axes
     inside = (grid.lam >= axes.lam_min) & (grid.lam <= axes.lam_max)
     lam, w_f, orders = grid.lam[inside], grid.w_f[grid.w_f <= axes.w_f_max], np.arange(1, grid.n_max + 1)
-    every = np.meshgrid(orders, grid.C, w_f, lam, indexing="ij")
-    n, c, w, length = (column.ravel() for column in every)
-    table = series.interpolate(np.ones(len(n), bool), lam=length, w_f=w, C=c, n=n)
-    folds = {name: table[name].reshape(every[0].shape) for name in (*SIDES, "C_cusp")}
+    shape = (len(orders), len(grid.C), len(w_f), len(lam))
+    n, c, w, length = (column.ravel() for column in np.meshgrid(orders, grid.C, w_f, lam, indexing="ij"))
+    every: dict[str, NDArray[Any]] = {"lam": length, "w_f": w, "C": c, "n": n}
+    table = series.interpolate(np.ones(len(n), bool), **every)
+    folds = {name: table[name].reshape(shape) for name in (*SIDES, "C_cusp")}
     # Names of their own: a reader that merges the groups must not take these axes for those of the vacuum.
     axis = {name: f"drag_{name}" for name in ("n", "C", "w_f", "lam")}
     dims = tuple(axis.values())

@@ -191,7 +191,7 @@ class Cables:
         return len(self.x)
 
 
-def _curves(cables: Cables, bar: tqdm | None = None) -> tuple[list[Curve], Array]:
+def _curves(cables: Cables, bar: tqdm | None = None) -> tuple[list[Curve], NDArray[np.int64]]:
     """Curves of folds, from the vacuum on, and their statuses."""
     curves: list[Curve] = []
     statuses = []
@@ -313,7 +313,8 @@ def fit_series(grid: DragGrid, n: int, bar: tqdm) -> Series:
 def _through(log_cusp: Array, values: Array, shape: tuple[int, int]) -> Series:
     """Series through log C*, shape (cables,), and log gamma and log r_f, shape (2, cables, sigma), on nodes `shape`."""
     none = np.empty((0, *shape))
-    return Series(*_coefficients(values, shape), coefficients(log_cusp.reshape(shape)), none, none)
+    gamma, r_f = _coefficients(values, shape)
+    return Series(gamma, r_f, coefficients(log_cusp.reshape(shape)), none, none)
 
 
 def _with_speeds(series: Series, values: Array, shape: tuple[int, int]) -> Series:
@@ -353,8 +354,8 @@ def measure_errors(grid: DragGrid, n: int, series: Series, bar: tqdm) -> tuple[A
     at = axes.speeds(series.gamma, y, x).log_gamma(np.tile(midpoints(grid.series_speed), (len(cables), 1)))
     guess = series.guess_by_speed(axes, at, y, x)
     said = guess[:, :, 1].copy()
-    for k, curve in zip(np.flatnonzero(traced), curves, strict=True):
-        guess[k] = at_speeds(curve, at[k])[:, [0, 2]]
+    for row, curve in zip(np.flatnonzero(traced), curves, strict=True):
+        guess[row] = at_speeds(curve, at[row])[:, [0, 2]]
     wrong_by_speed = np.abs(_by_speed(cables, guess, at)[0] - said).max(axis=1)
     return tuple(
         stated_error(worst_of_blocks(measured, y, x, grid.error_blocks))

@@ -87,7 +87,12 @@ class Atlas:
         self.attributes, data, self.sha256 = read_root(path)
         method = self.attributes.get("method", "")
         with open_group(path, data) as file:
-            self._parts = {part: part(file) for part in PARTS if part.in_file(file, method)}
+            try:
+                self._parts = {part: part(file) for part in PARTS if part.in_file(file, method)}
+            except (AttributeError, IndexError, KeyError) as error:
+                raise AtlasFileError(
+                    f"{path} was built by another version of towatlas and lacks what is read ({error}); build it again"
+                ) from None
         if not self._parts:
             raise AtlasFileError(
                 f"{path} was built with --method {method} and holds a plain table only; lookup needs an atlas built "

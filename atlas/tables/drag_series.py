@@ -251,13 +251,13 @@ class DragSeries:
                 some = i[part]
                 found = self._by_speed_at(order - 1, y[part], x[part], np.log(np.maximum(C[some], 1e-300)))
                 table["C_lasting"][some], table["error_lasting"][some] = found["C_lasting"], found["error_lasting"]
-                for side, kept, open_ in (
+                for suffix, kept, open_ in (
                     ("ends", codes_ends, below[part] & (-sigma[part] < axes.sigma_min)),
                     ("again", codes_again, below[part]),
                 ):
                     k = some[open_]
-                    kept[k] = found[f"status_{side}"][open_]
-                    for name in (side, f"r_f_{side}", f"error_{side}"):
+                    kept[k] = found[f"status_{suffix}"][open_]
+                    for name in (suffix, f"r_f_{suffix}", f"error_{suffix}"):
                         table[name][k] = found[name][open_]
         return table | dict(zip(STATUSES, (codes, codes_ends, codes_again, codes_cusp), strict=True))
 
