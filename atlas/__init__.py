@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from towatlas.effort import TooMuchWork, patience
     from towatlas.limits import excess_length, massless_cable, threshold_length
-    from towatlas.results import CriticalStates, DragFolds, Equilibria, FishPositions, Folds
+    from towatlas.results import CriticalStates, Cusps, DragFolds, Equilibria, FishPositions, Folds
     from towatlas.scene.designs import design
     from towatlas.scene.file import read_scene
     from towatlas.scene.jumps import answer_scene
     from towatlas.solve.critical import solve_critical
+    from towatlas.solve.cusps import cusps
     from towatlas.solve.drag_folds import solve_drag_folds
     from towatlas.solve.equilibria import equilibria
     from towatlas.solve.folds import folds
@@ -28,6 +29,7 @@ __all__ = [
     "Atlas",
     "AtlasFileError",
     "CriticalStates",
+    "Cusps",
     "DragFolds",
     "Equilibria",
     "FishPositions",
@@ -35,6 +37,7 @@ __all__ = [
     "System",
     "TooMuchWork",
     "answer_scene",
+    "cusps",
     "design",
     "equilibria",
     "equilibria_many",
@@ -55,11 +58,12 @@ __all__ = [
 _HOMES = {
     "effort": ("TooMuchWork", "patience"),
     "limits": ("excess_length", "massless_cable", "threshold_length"),
-    "results": ("CriticalStates", "DragFolds", "Equilibria", "FishPositions", "Folds"),
+    "results": ("CriticalStates", "Cusps", "DragFolds", "Equilibria", "FishPositions", "Folds"),
     "scene.designs": ("design",),
     "scene.file": ("read_scene",),
     "scene.jumps": ("answer_scene",),
     "solve.critical": ("solve_critical",),
+    "solve.cusps": ("cusps",),
     "solve.drag_folds": ("solve_drag_folds",),
     "solve.equilibria": ("equilibria",),
     "solve.folds": ("folds",),

@@ -198,6 +198,43 @@ class Folds:
 
 
 @dataclass(frozen=True)
+class Cusps:
+    """Cusps of one cable as its speed and one other of its numbers move, in rising order of that number.
+
+    Attributes
+    ----------
+    system : System
+        The cable, its fish and the medium, where what moves is lowest.
+    moved : str
+        Name of the number that moves beside the speed.
+    value : ndarray, shape (cusps,)
+        Of it [-].
+    gamma : ndarray, shape (cusps,)
+        Speed Omega sqrt(R/g) [-], negative in a turn to port.
+    r_f : ndarray, shape (cusps,)
+        Distance of the fish from the axis over tow radius [-], > 0.
+    error : ndarray, shape (cusps,)
+        Estimated relative error of `value` [-], > 0.
+    complete : bool
+        Whether everything that was looked at was made out.
+    searched : str
+        What was looked at, in words.
+    """
+
+    system: System
+    moved: str
+    value: Array
+    gamma: Array
+    r_f: Array
+    error: Array
+    complete: bool
+    searched: str
+
+    def __len__(self) -> int:
+        return len(self.value)
+
+
+@dataclass(frozen=True)
 class FishPositions:
     """Where the fish is on one branch of the equilibria in a vacuum; arrays of one shape, that of what was asked.
 

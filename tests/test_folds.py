@@ -5,11 +5,12 @@ from math import inf
 
 import numpy as np
 import pytest
-from helpers import changed, run
+from helpers import run
 
 import towatlas
+from benchmarks import scenes
 from towatlas.scene.file import make_scene
-from towatlas.scene.jumps import LOOKED, answer_scene
+from towatlas.scene.jumps import answer_scene
 from towatlas.system import System
 
 # A sphere of 250 lbf towed through sea water at 5 kn on 26,900 ft of half-inch cable, circle 10,000 ft: C_D 1.27,
@@ -223,47 +224,40 @@ def test_jumps_of_scenes(scene, speeds, capsys, tmp_path):
     assert len(answer.equilibria) == 3
 
 
-def random_scenes(count, seed):
-    """Scenes of people's sizes, in air and in water; each depends on the seed and its number alone."""
-    for number in range(count):
-        rng = np.random.default_rng((seed, number))
-        water = number % 2 == 1
-        radius = 10 ** rng.uniform(0.5, 3.5)
-        tow = {"radius": radius, "speed": 10 ** (rng.uniform(-0.5, 1.0) if water else rng.uniform(0.5, 2.0))}
-        table = changed(
-            cable__length=radius * 10 ** rng.uniform(-0.3, 1.2),
-            cable__mass_per_length=10 ** (rng.uniform(-0.7, 0.5) if water else rng.uniform(-2.0, 0.0)),
-            cable__diameter=10 ** rng.uniform(-2.7, -1.9),
-            cable__drag_coefficient=rng.uniform(0.8, 1.8),
-            fish__mass=10 ** rng.uniform(0.0, 2.5),
-            fish__volume=10 ** rng.uniform(-4.0, -2.5),
-            tow=tow,
-            fluid={"name": "seawater" if water else "air"},
-        )
-        yield make_scene(table)
-
-
-def check_scene(scene):
-    """The number of shapes changes by two across every jump stated, and nowhere else up to the speed looked at."""
-    answer = answer_scene(scene)
-    choice = answer.choice.answer
-    folds, system = choice.folds, choice.system
-    assert folds.complete
-    edges = scene.gamma * np.array([LOOKED[0], *(folds.gamma / scene.gamma), LOOKED[1]])
-    rng = np.random.default_rng(7)
-    between = edges[:-1] + np.diff(edges) * np.concatenate([[1e-4], rng.random(3), [1 - 1e-4]])[:, None]
-    found = towatlas.equilibria_many(system.lam, system.w_f, between, **fluid_of(system))
-    expected = np.append(folds.shapes_below, folds.shapes_above[-1:] if len(folds) else len(answer.equilibria))
-    np.testing.assert_array_equal(found["count"].values, np.broadcast_to(expected, found["count"].shape))
-    place = int(np.searchsorted(folds.gamma, scene.gamma))
-    assert len(answer.equilibria) == expected[place]
-    return len(folds)
+def test_cusps():
+    """That of a pair of the vacuum, and one that drag alone makes: two folds on one side of it, none on the other."""
+    known = towatlas.solve_drag_folds(37.8, 1352, 0.02, 3)
+    found = towatlas.cusps(37.8, 1352, (6, 8), C=(0.02, 0.03))
+    assert found.complete
+    assert abs(found.value[0] / known.C_cusp - 1) <= known.error_cusp + found.error[0] < 1e-9
+    assert found.gamma == pytest.approx([float(known.gamma_cusp)], rel=1e-6)
+    scene = make_scene(DEEP)
+    system, gamma = scene.system("water"), scene.gamma
+    span, fluid = (gamma / 2, 2 * gamma), fluid_of(system)
+    found = towatlas.cusps(system.lam, system.w_f, span, **fluid | {"C_t": (0.01 * system.C, 0.05 * system.C)})
+    assert (len(found), found.moved, found.complete) == (1, "C_t", True)
+    C_t, near = float(found.value[0]), (0.99 * found.gamma[0], 1.01 * found.gamma[0])
+    assert 0.02 < C_t / system.C < 0.025
+    for factor, count in ((1 - 1e-4, 2), (1 + 1e-4, 0)):
+        assert len(towatlas.folds(system.lam, system.w_f, near, **fluid | {"C_t": C_t * factor})) == count
+    port = towatlas.cusps(37.8, 1352, (-8, -6), C=(0.02, 0.03))
+    assert port.gamma == pytest.approx([-float(known.gamma_cusp)], rel=1e-6)
+    for wrong, match in (
+        (((5, 1, 1.0), {"C": (1, 2)}), "must be pairs"),
+        (((5, 1, (1, 2)), {}), "must be pairs"),
+        (((5, 1, (2, 1)), {"C": (1, 2)}), "gamma must be two finite numbers"),
+        (((5, 1, (1, 2)), {"C": (0, 2)}), "C must be two finite numbers"),
+    ):
+        with pytest.raises(ValueError, match=match):
+            towatlas.cusps(*wrong[0], **wrong[1])
 
 
 @pytest.mark.slow
 def test_scenes_do_not_contradict_themselves():
-    jumps = [check_scene(scene) for scene in random_scenes(24, 2026)]
-    assert sum(jumps) > 5
+    """As 300 others do not: docs/data/scenes.csv."""
+    rows = list(scenes.check_all(24, 2026))
+    assert not [row for row in rows if row.contradicts or row.refused]
+    assert sum(row.jumps for row in rows) > 5
 
 
 def test_systems_at_once():

@@ -20,9 +20,10 @@ from towatlas.kernels import status
 from towatlas.limits import unchecked_excess_length
 from towatlas.numerics.curves import Curve, Steps, follow
 from towatlas.numerics.hermite import cubic
-from towatlas.numerics.rows import EPS, newton, solve_systems
+from towatlas.numerics.rows import EPS, newton
 from towatlas.results import DragFolds
 from towatlas.solve.critical import solve_rows
+from towatlas.solve.cusps import cusp_equations, cusp_errors
 from towatlas.solve.folds import folds_in_speed
 from towatlas.solve.jets import jets_of
 from towatlas.solve.shots import Array, Integers, direction_of, shoot
@@ -31,7 +32,6 @@ from towatlas.system import System, nondense_rows
 FOLD = jets_of(2, gamma=True, parameter=True)
 AT_DRAG = jets_of(2, gamma=True)
 AT_SPEED = jets_of(2, parameter=True)
-CUSP = jets_of(3, gamma=True, parameter=True)
 
 # The number that the parameter moves, by its logarithm.
 DRAG = ("C",)
@@ -152,7 +152,7 @@ def polish_cusps(z: Array, *, lam: Array, w_f: Array) -> tuple[Array, Integers]:
     """
 
     def residuals(z: Array, i: Integers) -> tuple[Array, Array, Booleans]:
-        return *_cusp_equations(z, lam=lam[i], w_f=w_f[i]), np.ones(len(z), bool)
+        return _cusp_equations(z, lam=lam[i], w_f=w_f[i])
 
     found, _, solved = newton(
         residuals, z, rounds=ROUNDS, longest=1.0, settled=lambda step, size, last: size < np.sqrt(SETTLED)
@@ -160,29 +160,18 @@ def polish_cusps(z: Array, *, lam: Array, w_f: Array) -> tuple[Array, Integers]:
     return found, np.where(solved, status.OK, status.NOT_CONVERGED)
 
 
-def cusp_errors(z: Array, *, lam: Array, w_f: Array) -> Array:
-    """Estimated relative errors of C at cusps: twice what one more step of Newton would move it by, and rounding."""
+def _cusp_errors(z: Array, *, lam: Array, w_f: Array) -> Array:
+    """Estimated relative errors of C at cusps."""
     errors = np.full(len(z), np.nan)
     i = np.flatnonzero(np.isfinite(z).all(axis=1))
-    value, jacobian = _cusp_equations(z[i], lam=lam[i], w_f=w_f[i])
-    step = solve_systems(jacobian, -value)
-    # log rho and its slope alone fix speed and drag at the cusp: what their rounding moves log C by.
-    along, bent = jacobian[:, 0], jacobian[:, 1]
-    with np.errstate(all="ignore"):
-        determinant = along[:, 1] * bent[:, 2] - along[:, 2] * bent[:, 1]
-        rounding = ROUNDINGS * EPS * (np.abs(along[:, 1]) + np.abs(bent[:, 1])) / np.abs(determinant)
-    # The step is the error but for its own: twice it is no less.
-    errors[i] = 2.0 * np.abs(step[:, 2]) + rounding
+    value, jacobian, _ = _cusp_equations(z[i], lam=lam[i], w_f=w_f[i])
+    errors[i] = cusp_errors(value, jacobian)[:, 1]
     return errors
 
 
-def _cusp_equations(z: Array, *, lam: Array, w_f: Array) -> tuple[Array, Array]:
-    """log rho and its first two slopes, and their Jacobian in log r, log gamma, log C."""
-    at = CUSP.at
+def _cusp_equations(z: Array, *, lam: Array, w_f: Array) -> tuple[Array, Array, Booleans]:
     systems = nondense_rows(lam=lam, w_f=w_f, C=np.exp(z[:, 2]))
-    jet = shoot(np.exp(z[:, 0]), np.exp(z[:, 1]), systems, CUSP, directions=direction_of(DRAG, systems)).log_rho
-    along = [((k + 1) * jet[:, at(k + 1, 0, 0)], jet[:, at(k, 1, 0)], jet[:, at(k, 0, 1)]) for k in range(3)]
-    return jet[:, [at(k, 0, 0) for k in range(3)]], np.stack([np.stack(row, axis=1) for row in along], axis=1)
+    return cusp_equations(z[:, 0], np.exp(z[:, 1]), systems, direction_of(DRAG, systems))
 
 
 def crossing(curve: Curve, log_c: float, side: str) -> Array | None:
@@ -407,7 +396,7 @@ def _fold_rows(*, lam: Array, w_f: Array, n: Integers, which: Integers, c: Array
     """Folds at drags c of the cables `which` of those given."""
     curves, traced = trace_folds(lam=lam, w_f=w_f, n=n)
     cusps, cusp_codes = solve_cusps(curves, traced, lam=lam, w_f=w_f)
-    cusp_error = cusp_errors(cusps, lam=lam, w_f=w_f)
+    cusp_error = _cusp_errors(cusps, lam=lam, w_f=w_f)
     lasting, lasting_error = _lasting(curves, lam=lam, w_f=w_f)
     vacuum = solve_rows(lam=lam, w_f=w_f, n=n, excess=unchecked_excess_length(lam=lam, w_f=w_f, n=n))
     with np.errstate(divide="ignore"):
