@@ -217,7 +217,8 @@ class _Finder:
         for k, t in enumerate(np.linspace(0.0, self.high[1], self.values)):
             check_patience("folds at values of the number that moves", REMEDY, done=k, of=self.values)
             system = System(*self._rows(np.array([t]))[0].tolist())
-            found = folds_in_speed(system, *(self.sign * np.exp([self.low[0], self.high[0]])), named=False)
+            slow, fast = (float(self.sign * np.exp(end[0])) for end in (self.low, self.high))
+            found = folds_in_speed(system, slow, fast, named=False)
             complete &= found.complete
             log_gamma = np.log(np.abs(found.gamma))
             starts.append(np.stack([np.log(found.r_f) + 2.0 * log_gamma, log_gamma, np.full(len(found), t)], axis=1))
