@@ -240,7 +240,7 @@ class _Finder:
             return value, np.stack([along, bent], axis=1), second[:, None], sound
 
         def stop(z: Array, direction: Array, second: Array, i: Integers) -> Booleans:
-            return ((z[:, 1:] < self.low - MARGIN) | (z[:, 1:] > self.high + MARGIN)).any(axis=1)
+            return np.asarray(((z[:, 1:] < self.low - MARGIN) | (z[:, 1:] > self.high + MARGIN)).any(axis=1))
 
         near = [np.empty((0, 3))]
         for way in (-1.0, 1.0):
