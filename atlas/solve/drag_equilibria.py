@@ -41,7 +41,7 @@ def solve_drag_equilibria(system: System, gamma: float) -> Equilibria:
     if not len(found.x):
         code = int(found.status[0]) or status.NOT_CONVERGED
         raise ArithmeticError(f"{system}, gamma = {gamma:g}: {status.SENTENCES[code]}")
-    columns = quantities(found, row, np.array([gamma]))
+    columns = quantities(found.row, found.x, row, np.array([gamma]))
     order = np.argsort(columns["R_x0"])
     return Equilibria(
         **{name: column[order] for name, column in columns.items()},
@@ -69,12 +69,15 @@ def _searched(found: Found, row: Array, gamma: float) -> str:
     return text + "; that there are no others is not proved"
 
 
-def quantities(found: Found, systems: Array, gamma: Array) -> dict[str, NDArray[Any]]:
+def quantities(row: Integers, x: Array, systems: Array, gamma: Array) -> dict[str, NDArray[Any]]:
     """Quantities of shapes that were found, turned so that the tow point is at (1, 0, 0).
 
     Parameters
     ----------
-    found : Found
+    row : ndarray of int, shape (shapes,)
+        Of the system.
+    x : ndarray, shape (shapes,)
+        log of the radius of the fish over g / Omega^2.
     systems : ndarray, shape (systems, columns)
     gamma : ndarray, shape (systems,)
 
@@ -83,7 +86,7 @@ def quantities(found: Found, systems: Array, gamma: Array) -> dict[str, NDArray[
     dict of ndarray, shape (shapes,)
         R_x0, R_y0, R_z0, x_f, y_f, z_f, r_f, phase_deg, tension, nodes, near_axis, error, as of `Equilibria`.
     """
-    row, r = found.row, np.exp(found.x)
+    r = np.exp(x)
     ends = shoot(r, gamma[row], systems[row], SLOPE)
     unit = np.square(gamma[row])
     turned = np.arctan2(ends.Y[:, 0], ends.X[:, 0])

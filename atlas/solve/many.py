@@ -125,11 +125,11 @@ def _solve(systems: Array, gamma: Array) -> tuple[dict[str, Any], Any, Any]:
         codes[block[(np.bincount(found.row, minlength=len(block)) == 0) & (found.status == status.OK)]] = (
             status.NOT_CONVERGED
         )
-        parts.append(quantities(found, systems[block], gamma[block]))
+        parts.append(quantities(found.row, found.x, systems[block], gamma[block]))
         rows.append(block[found.row])
     if not parts:
         nothing = search(systems[:0], gamma[:0])
-        parts, rows = [quantities(nothing, systems[:0], gamma[:0])], [nothing.row]
+        parts, rows = [quantities(nothing.row, nothing.x, systems[:0], gamma[:0])], [nothing.row]
     row = np.concatenate(rows)
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return fill(columns, row, len(gamma)), np.bincount(row, minlength=len(gamma)), codes

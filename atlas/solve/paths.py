@@ -1,0 +1,369 @@
+"""All shapes of a system as one of its numbers moves, and where two of them meet and are gone, or come to be.
+
+Columns, all shapes at one value, are put side by side until each shape of one is plainly that of the next, or two of
+them have met in a fold, solved for by Newton's method. Pairs that come and go between two columns show as extrema of
+the radius of the tow point that are about to reach the tow radius: those are halved, too. So folds are found wherever
+they come from, closed curves of shapes with them.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from towatlas.kernels import status
+from towatlas.kernels.system import COLUMNS
+from towatlas.numerics.rows import EPS, newton
+from towatlas.solve.jets import Jets, jets_of
+from towatlas.solve.search import search
+from towatlas.solve.shots import Array, Ends, Integers, direction_of, shoot
+
+Booleans = NDArray[np.bool_]
+# Columns at first, in the logarithm of what moves; two so near that they are not halved again.
+SPACING, FEWEST, NEAREST = 0.12, 9, 1e-10
+ROUNDS = 48
+# How far a shape may be from where the slopes at both columns have it: over the way to the next shape, and in x.
+ASTRAY, ASTRAY_IN_X = 0.1, 0.01
+# Extrema of log rho so near to zero are watched; which part of the way to the next column one may be from reaching it.
+WATCHED, REACHES = 0.5, 0.6
+# Newton's method for a fold.
+FOLD_ROUNDS, LONGEST, SETTLED = 24, 1.0, 1e-11
+ROUNDINGS = 64.0
+
+
+@dataclass(frozen=True)
+class Path:
+    """Systems as one number moves by its logarithm t.
+
+    Attributes
+    ----------
+    row : ndarray, shape (columns,)
+        The system where t = 0, as of `System.row`.
+    gamma : float
+        The speed there [-]; a turn to port where negative.
+    moved : tuple of str
+        "gamma", or the columns of the system that move by one factor.
+    """
+
+    row: Array
+    gamma: float
+    moved: tuple[str, ...]
+
+    @property
+    def by_speed(self) -> bool:
+        """Whether it is the speed that moves."""
+        return self.moved == ("gamma",)
+
+    def at(self, t: Array) -> tuple[Array, Array]:
+        """Systems and speeds.
+
+        Parameters
+        ----------
+        t : ndarray, shape (points,)
+
+        Returns
+        -------
+        ndarray, shape (points, columns)
+        ndarray, shape (points,)
+        """
+        factor = np.exp(t)
+        rows = np.tile(self.row, (len(t), 1))
+        gamma = np.full(len(t), self.gamma)
+        if self.by_speed:
+            return rows, gamma * factor
+        chosen = [COLUMNS.index(name) for name in self.moved]
+        rows[:, chosen] *= factor[:, None]
+        return rows, gamma
+
+    def jets(self, degree: int) -> Jets:
+        """Jets in log r to a degree, and in t.
+
+        Parameters
+        ----------
+        degree : int
+
+        Returns
+        -------
+        Jets
+        """
+        return jets_of(degree, gamma=self.by_speed, parameter=not self.by_speed)
+
+    def shots(self, x: Array, t: Array, jets: Jets) -> Ends:
+        """Shots from points.
+
+        Parameters
+        ----------
+        x, t : ndarray, shape (points,)
+            log of the radius of the fish over g / Omega^2.
+        jets : Jets
+
+        Returns
+        -------
+        Ends
+        """
+        rows, gamma = self.at(t)
+        return shoot(np.exp(x), gamma, rows, jets, directions=direction_of(self.moved, rows))
+
+    def log_rho(self, x: Array, t: Array, degree: int) -> tuple[Array, Array, Booleans]:
+        """log rho and its derivatives.
+
+        Parameters
+        ----------
+        x, t : ndarray, shape (points,)
+            log of the radius of the fish over g / Omega^2 - at fixed radius over the tow radius, t moves the speed.
+        degree : int
+            Highest derivative in x.
+
+        Returns
+        -------
+        ndarray, shape (points, degree + 1)
+            Derivatives in x.
+        ndarray, shape (points, degree)
+            Those of the first by t.
+        ndarray of bool, shape (points,)
+            Whether the shots were made.
+        """
+        jets = self.jets(degree)
+        ends = self.shots(x, t, jets)
+        factorial = np.cumprod([1.0, *range(1, degree + 1)])
+        along = [factorial[k] * ends.log_rho[:, jets.at(k, 0, 0)] for k in range(degree + 1)]
+        place = (lambda k: (k, 1, 0)) if self.by_speed else (lambda k: (k, 0, 1))
+        across = [factorial[k] * ends.log_rho[:, jets.at(*place(k))] for k in range(degree)]
+        sound = (ends.status == status.OK) & np.isfinite(ends.log_rho).all(axis=1)
+        return np.stack(along, axis=1), np.stack(across, axis=1), sound
+
+
+@dataclass(frozen=True)
+class Column:
+    """All shapes at one t.
+
+    Attributes
+    ----------
+    t : float
+    x, moves, slopes, bends : ndarray, shape (shapes,)
+        log of the radius of the fish, rising, how it moves with t, the slope of log rho there, and how that moves.
+    peaks, heights, rises : ndarray, shape (extrema,)
+        Where log rho has an extremum near zero, its height, and how that moves.
+    whole : bool
+        Whether all of the range of x was searched.
+    """
+
+    t: float
+    x: Array
+    moves: Array
+    slopes: Array
+    bends: Array
+    peaks: Array
+    heights: Array
+    rises: Array
+    whole: bool
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Where two shapes meet.
+
+    Attributes
+    ----------
+    t, x : float
+        There.
+    error : float
+        Of t, > 0.
+    pair : int
+        The first of the two in the column beside it that has them, >= 0.
+    """
+
+    t: float
+    x: float
+    error: float
+    pair: int
+
+
+@dataclass(frozen=True)
+class Trace:
+    """All shapes at values of t, each of which is plainly one of the next value's, or meets another in a fold between.
+
+    Attributes
+    ----------
+    path : Path
+    columns : list of Column
+        In rising order of t.
+    folds : list of Fold or None
+        Between each and the next.
+    certain : bool
+        Whether all of that was made out, and each column was searched in whole.
+    """
+
+    path: Path
+    columns: list[Column]
+    folds: list[Fold | None]
+    certain: bool
+
+    def branches(self) -> list[Integers]:
+        """Which branch each shape of each column is on: the same number as long as no fold ends it.
+
+        Returns
+        -------
+        list of ndarray of int, shape (shapes,)
+        """
+        labels = [np.arange(len(self.columns[0].x))]
+        fresh = len(labels[0])
+        for fold, (a, b) in zip(self.folds, pairwise(self.columns), strict=True):
+            old = labels[-1]
+            if fold is not None and len(b.x) > len(a.x):
+                old = np.insert(old, fold.pair, [fresh, fresh + 1])
+                fresh += 2
+            elif fold is not None:
+                old = np.delete(old, [fold.pair, fold.pair + 1])
+            elif len(a.x) != len(b.x):
+                # Not made out: what follows has nothing to do with what was.
+                old, fresh = np.arange(fresh, fresh + len(b.x)), fresh + len(b.x)
+            labels.append(old)
+        return labels
+
+
+def _columns(path: Path, t: Array) -> list[Column]:
+    rows, gamma = path.at(t)
+    found = search(rows, gamma)
+    near = np.abs(found.peaks[:, 2]) < WATCHED
+    peak_row, peak = found.peaks[near, 0].astype(np.int64), found.peaks[near, 1]
+    every = np.concatenate([found.row, peak_row])
+    along, across, _ = path.log_rho(np.concatenate([found.x, peak]), t[every], 2)
+    count = len(found.x)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        moves = -across[:count, 0] / along[:count, 1]
+        bends = along[:count, 2] * moves + across[:count, 1]
+    columns = []
+    for k in range(len(t)):
+        here, there = found.row == k, peak_row == k
+        columns.append(
+            Column(
+                float(t[k]),
+                found.x[here],
+                moves[here],
+                along[:count, 1][here],
+                bends[here],
+                peak[there],
+                along[count:, 0][there],
+                across[count:, 0][there],
+                bool(found.status[k] == status.OK),
+            )
+        )
+    return columns
+
+
+def _goes_on(a: Column, b: Column, drop_a: int = -1, drop_b: int = -1) -> bool:
+    """Whether the shapes of two columns are plainly the same, but for a pair of one of them."""
+    keep_a = np.delete(np.arange(len(a.x)), [drop_a, drop_a + 1] if drop_a >= 0 else [])
+    keep_b = np.delete(np.arange(len(b.x)), [drop_b, drop_b + 1] if drop_b >= 0 else [])
+    x, y = a.x[keep_a], b.x[keep_b]
+    if len(x) != len(y):
+        return False
+    apart = np.abs(y - x - 0.5 * (b.t - a.t) * (a.moves[keep_a] + b.moves[keep_b]))
+    gaps = np.ones(len(x))
+    for column, keep in ((a, keep_a), (b, keep_b)):
+        between = np.diff(column.x)
+        nearest = np.fmin(np.append(between, inf), np.insert(between, 0, inf))
+        gaps = np.fmin(gaps, nearest[keep])
+    return bool((apart <= np.fmin(ASTRAY * gaps, ASTRAY_IN_X)).all())
+
+
+def _about_to(column: Column, step: float) -> bool:
+    """Whether within a step an extremum of a column may reach the tow radius, or a shape be where two more begin.
+
+    Where the slope at a shape falls towards zero and rises again there is a cusp near by, with two folds on one side
+    of it, as close together as one likes.
+    """
+    reaches = column.heights * column.rises * step < 0.0
+    reaches &= np.abs(column.heights) < REACHES * np.abs(column.rises * step)
+    folds = column.slopes * column.bends * step < 0.0
+    folds &= np.abs(column.slopes) < np.abs(column.bends * step)
+    return bool(reaches.any() or folds.any())
+
+
+def _solve_folds(path: Path, x: Array, t: Array) -> tuple[Array, Array, Array, Booleans]:
+    """Folds near guesses: x, t, error of t, and whether they were found."""
+    rate = np.full(len(x), np.nan)
+
+    def residuals(z: Array, i: Integers) -> tuple[Array, Array, Booleans]:
+        along, across, sound = path.log_rho(z[:, 0], z[:, 1], 2)
+        rate[i] = across[:, 0]
+        matrix = np.stack([along[:, 1], across[:, 0], along[:, 2], across[:, 1]], axis=1).reshape(-1, 2, 2)
+        return along[:, :2], matrix, sound
+
+    def settled(step: Array, size: Array, last: Array) -> Booleans:
+        # At a fold t depends on x to the second order only: t is done before x.
+        return (size < SETTLED) | (np.abs(step[:, 1]) < SETTLED) & (size > 0.5 * last) & (size < 1e-4)
+
+    z, step, solved = newton(residuals, np.stack([x, t], axis=1), rounds=FOLD_ROUNDS, longest=LONGEST, settled=settled)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        error = np.abs(step[:, 1]) + ROUNDINGS * EPS / np.abs(rate)
+    return z[:, 0], z[:, 1], error, solved
+
+
+def _meeting(path: Path, fewer: Column, more: Column) -> Fold | None:
+    """The fold in which a pair of one column meets before the other, if that is all that happens between them."""
+    if len(more.x) != len(fewer.x) + 2:
+        return None
+    low, high = sorted((fewer.t, more.t))
+    pairs = np.array([k for k in range(len(more.x) - 1) if _goes_on(fewer, more, drop_b=k)], np.int64)
+    if not len(pairs):
+        return None
+    guess = 0.5 * (more.x[pairs] + more.x[pairs + 1])
+    x, t, error, solved = _solve_folds(path, guess, np.full(len(pairs), more.t))
+    gap = more.x[pairs + 1] - more.x[pairs]
+    good = solved & (t >= low) & (t <= high) & (np.abs(x - guess) < gap)
+    if good.sum() != 1:
+        return None
+    k = int(np.flatnonzero(good)[0])
+    return Fold(float(t[k]), float(x[k]), float(error[k]), int(pairs[k]))
+
+
+def trace(path: Path, low: float, high: float, at: Array | None = None) -> Trace:
+    """All shapes of a path, and all its folds, with t between two values.
+
+    Parameters
+    ----------
+    path : Path
+    low, high : float
+        Of t, low < high.
+    at : ndarray, shape (values,), optional
+        Values of t between them to be among those that are looked at.
+
+    Returns
+    -------
+    Trace
+    """
+    count = max(FEWEST, int(np.ceil((high - low) / SPACING)) + 1)
+    columns = _columns(path, np.union1d(np.linspace(low, high, count), [] if at is None else at))
+    certain = all(column.whole for column in columns)
+    open_ = [True] * (len(columns) - 1)
+    folds: list[Fold | None] = [None] * (len(columns) - 1)
+    for _ in range(ROUNDS):
+        halved: list[int] = []
+        for k, (a, b) in enumerate(pairwise(columns)):
+            if not open_[k]:
+                continue
+            step = b.t - a.t
+            if len(a.x) == len(b.x):
+                plain = _goes_on(a, b) and not _about_to(a, step) and not _about_to(b, -step)
+            else:
+                folds[k] = _meeting(path, a, b) if len(a.x) < len(b.x) else _meeting(path, b, a)
+                plain = folds[k] is not None
+            if plain:
+                open_[k] = False
+            elif step > NEAREST:
+                halved.append(k)
+            else:
+                open_[k], certain = False, False
+        if not halved:
+            break
+        new = _columns(path, np.array([0.5 * (columns[k].t + columns[k + 1].t) for k in halved]))
+        certain &= all(column.whole for column in new)
+        for k, column in zip(reversed(halved), reversed(new), strict=True):
+            columns.insert(k + 1, column)
+            open_[k : k + 1] = [True, True]
+            folds[k : k + 1] = [None, None]
+    return Trace(path, columns, folds, certain and not any(open_))
