@@ -192,9 +192,12 @@ def check_foreseen(seconds: float, what: str, remedy: str) -> None:
     """
     budget = _budget.get()
     # An estimate of nan, of what overflows, foresees nothing. What is used up already, the next check says.
-    if budget is not None and seconds > budget.seconds - budget.used > 0.0:
+    if budget is not None and seconds > (left := budget.seconds - budget.used) > 0.0:
         takes = f"{float(f'{seconds:.1g}'):g}" if seconds < 1e6 else "a million"
-        raise TooMuchWork(f"{what}, too many for {budget.seconds:g} s of CPU: {takes} s or more; {_go_on(remedy)}")
+        allowed = (
+            f"{budget.seconds:g} s" if seconds > budget.seconds else f"the {left:.2g} s left of {budget.seconds:g} s"
+        )
+        raise TooMuchWork(f"{what}, too many for {allowed} of CPU: {takes} s or more; {_go_on(remedy)}")
 
 
 def listen(listener: Callable[[Progress | None], object]) -> None:

@@ -190,7 +190,7 @@ def _scene(rng: Rng, medium: str) -> list[str]:
 
 
 def _design(rng: Rng, medium: str) -> list[str]:
-    arguments = ["design", "--scene", "scene.toml", "--atlas", "atlas.nc", f"--depth={wide(rng, 50.0):.6g}"]
+    arguments = ["design", "--scene", "scene.toml", f"--depth={wide(rng, 50.0):.6g}"]
     for option, middle in (("max-length", 200.0), ("max-radius", 50.0)):
         arguments += [f"--{option}={wide(rng, middle):.6g}"] if rng.random() < 0.3 else []
     return [*arguments, *_speed(rng)]

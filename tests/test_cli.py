@@ -207,7 +207,9 @@ def test_compilation_is_announced_once(tmp_path):
 def test_every_object_of_json_says_its_schema(capsys, atlas_path, equilibria_path, arguments):
     from towatlas.commands.common import JSON_SCHEMA
 
-    files = {"fish": ("--table", equilibria_path), "equilibria": ()}.get(arguments[0], ("--atlas", atlas_path))
+    files = {"fish": ("--table", equilibria_path), "equilibria": (), "design": ()}.get(
+        arguments[0], ("--atlas", atlas_path)
+    )
     code, out, _ = run(capsys, *arguments, *files, "--json")
     answer = json.loads(out)
     assert code == 0

@@ -1,5 +1,6 @@
 """Cables that bring the fish to a depth: all of them, and exactly there."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -7,10 +8,13 @@ import pytest
 from helpers import run
 
 import towatlas
-from towatlas.scene.designs import design
-from towatlas.scene.file import read_scene
+from towatlas.scene.designs import design, with_length
+from towatlas.scene.file import make_scene, read_scene
+from towatlas.scene.models import solve_model
 from towatlas.solve.depths import cables_to_depth
+from towatlas.solve.lengths import cables_for
 from towatlas.solve.members import extrema, shoot_lanes, solve_members
+from towatlas.system import System
 
 SCAN = 300
 
@@ -142,9 +146,87 @@ def test_bad_input(arguments, match):
         cables_to_depth(**dict(zip(ASKED, arguments, strict=True)))
 
 
-def test_bad_radius():
-    with pytest.raises(ValueError, match="max_radius must be positive"):
-        design(read_scene("skop-fig3"), 0.5, max_radius=0.0)
+def test_bad_targets():
+    scene = read_scene("skop-fig3")
+    for name in ("max_radius", "max_tension"):
+        with pytest.raises(ValueError, match=f"{name} must be positive"):
+            design(scene, 0.5, **{name: 0.0})
+    with pytest.raises(ValueError, match="exactly one of depth, radius, tension is wanted, got depth, radius"):
+        design(scene, 0.5, radius=1.0)
+    with pytest.raises(ValueError, match="got none"):
+        design(scene)
+
+
+def random_designs(count, seed):
+    """w_f, gamma, depth and longest cable."""
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        w_f = 0.0 if rng.random() < 0.2 else 10 ** rng.uniform(-2, 2)
+        depth = 10 ** rng.uniform(-1, 1)
+        yield w_f, 10 ** rng.uniform(-0.5, 0.7), depth, max(1.01 * depth, 10 ** rng.uniform(0, 1.5))
+
+
+def test_lengths_in_any_medium_are_those_of_the_vacuum():
+    """Two solvers of different kind; shapes of all lengths, and shots ended at the depth."""
+    cables = 0
+    for w_f, gamma, depth, longest in random_designs(16, 3):
+        exact = cables_to_depth(w_f=w_f, gamma=gamma, z_f=depth, lam_max=longest)
+        found = cables_for(System.of(lam=depth * (1 - 1e-6), w_f=w_f), gamma, "depth", depth, longest)
+        assert found.complete
+        np.testing.assert_allclose(found.lam, exact.lam, rtol=1e-9)
+        assert (np.abs(found.lam / exact.lam - 1) <= found.error + 1e-11).all()
+        np.testing.assert_allclose(found.r_f, np.abs(exact.x_f), rtol=1e-7)
+        cables += len(found)
+    assert cables > 8
+
+
+@pytest.mark.parametrize("quantity", ["depth", "radius", "tension"])
+def test_lengths_with_drag_lead_back(quantity):
+    """Each quantity of each shape of a cable with several leads back to its length, once for each shape."""
+    system, gamma = System.of(16.0, 3.0, C=5.6), 3.1
+    shapes = towatlas.equilibria(16.0, 3.0, gamma, C=5.6)
+    assert len(shapes) == 5
+    column = {"depth": shapes.z_f, "radius": shapes.r_f, "tension": shapes.tension}[quantity]
+    for k, value in enumerate(column):
+        found = cables_for(dataclasses.replace(system, lam=12.0), gamma, quantity, float(value), 20.0)
+        assert found.complete
+        at = np.argmin(np.abs(found.lam / 16.0 - 1) + np.abs(np.log(found.r_f / shapes.r_f[k])))
+        assert found.lam[at] == pytest.approx(16.0, rel=1e-9)
+        assert found.r_f[at] == pytest.approx(shapes.r_f[k], rel=1e-9)
+        assert found.least < value < found.most
+        for lam, r_f in zip(found.lam, found.r_f, strict=True):
+            again = towatlas.equilibria(float(lam), 3.0, gamma, C=5.6)
+            its = int(np.argmin(np.abs(np.log(again.r_f / r_f))))
+            value_there = {"depth": again.z_f, "radius": again.r_f, "tension": again.tension}[quantity][its]
+            assert value_there == pytest.approx(value, rel=1e-8)
+
+
+WET = {
+    "cable": {"mass_per_length": 0.5, "diameter": "12 mm", "drag_coefficient": 1.4},
+    "fish": {"mass": 60, "volume": "20 l", "added_mass": 10},
+    "tow": {"radius": 40, "speed": "4 kn"},
+    "fluid": {"name": "seawater"},
+}
+
+
+def test_a_design_in_water():
+    """By the model that holds: the vacuum's length for this depth leaves the fish at 102 m."""
+    scene = make_scene(WET)
+    found = design(scene, 120.0)
+    (cable,) = found.chosen
+    assert (found.model, found.complete, cable.expected, cable.nodes) == ("water", True, True, 1)
+    assert cable.length == pytest.approx(136.7, abs=0.05)
+    exact = solve_model(with_length(scene, cable.length), "water")
+    np.testing.assert_allclose(exact.position, cable.position, rtol=1e-9)
+    assert cable.position[2] == pytest.approx(120.0, rel=1e-10)
+    assert exact.tension == pytest.approx(cable.tension, rel=1e-10)
+    vacuum = design(scene, 120.0, model="vacuum")
+    assert solve_model(with_length(scene, vacuum.chosen[0].length), "water").position[2] < 110
+    by_radius = design(scene, radius=cable.radius)
+    assert [other.length for other in by_radius.cables] == pytest.approx([cable.length], rel=1e-9)
+    by_tension = design(scene, tension=cable.tension)
+    assert [other.length for other in by_tension.cables] == pytest.approx([cable.length], rel=1e-9)
+    assert not design(scene, 120.0, max_tension=0.9 * cable.tension).chosen
 
 
 def test_overflow_is_said():
@@ -153,10 +235,8 @@ def test_overflow_is_said():
 
 
 @pytest.fixture
-def ask(capsys, atlas_path):
-    return lambda *arguments: run(
-        capsys, "design", "--scene", "skop-fig3", "--model", "vacuum", "--atlas", atlas_path, *arguments
-    )
+def ask(capsys):
+    return lambda *arguments: run(capsys, "design", "--scene", "skop-fig3", "--model", "vacuum", *arguments)
 
 
 def test_shell(ask):
@@ -171,7 +251,7 @@ def test_shell(ask):
         lam = row["length_m"] / scene.radius
         speeds = towatlas.solve_critical(lam, groups.w_f, range(1, 7)).gamma
         nearest = int(np.argmin(np.abs(speeds - 2.97)))
-        assert row["nearest_n"] == nearest + 1
+        assert row["nearest_shapes_above"] == 2 * nearest + 3
         assert row["distance_gamma"] == pytest.approx(speeds[nearest] - 2.97, abs=1e-8)
         assert row["distance_relative"] == pytest.approx(speeds[nearest] / 2.97 - 1, abs=1e-8)
         assert row["distance_m_s"] == pytest.approx(
@@ -185,7 +265,7 @@ def test_shell(ask):
     assert [row["expected"] for row in answer["cables"]].count(True) >= 1
     code, out, _ = ask("--depth", "25 in")
     assert code == 0
-    assert len(out.splitlines()) == 5 + len(answer["cables"])
+    assert len(out.splitlines()) == 7 + len(answer["cables"])
     nearer = json.loads(ask("--depth", "25 in", "--max-radius", "1 mm", "--json")[1])["cables"]
     assert nearer == [row for row in answer["cables"] if abs(row["x_f_m"]) <= 1e-3]
     assert 0 < len(nearer) < len(answer["cables"])
@@ -195,7 +275,7 @@ def test_none_is_an_answer(ask):
     code, out, err = ask("--depth", "25 in", "--max-radius", "1 um")
     assert (code, out) == (4, "")
     assert "none of the 3 cables" in err
-    assert "nearest to it" in err
+    assert "nearest comes one of 0.65725" in err
     code, out, err = ask("--depth", "1 m", "--max-length", "0.9 m", "--json")
     assert code == 4
     assert json.loads(out)["cables"] == []
@@ -203,16 +283,16 @@ def test_none_is_an_answer(ask):
     scene = read_scene("skop-fig3")
     groups = scene.system("vacuum")
     deepest = towatlas.equilibria(0.9 / scene.radius, groups.w_f, 2.97).z_f.max() * scene.radius
-    assert f"the deepest of the longest one is at {deepest:.6g} m" in err
+    assert f"to {deepest:.6g} m; a longer one may" in err
 
 
 def test_cables_without_transitions(ask):
     code, out, _ = ask("--depth", "1 cm", "--max-length", "1.2 cm", "--json", "--gamma", 0.1)
     (row,) = json.loads(out)["cables"]
     assert code == 0
-    assert row["nearest_n"] is None
+    assert row["nearest_gamma"] is None
     code, out, _ = ask("--depth", "1 cm", "--max-length", "1.2 cm", "--gamma", 0.1)
-    assert out.splitlines()[-1].split()[-2:] == ["-", "expected"]
+    assert out.splitlines()[-1].split()[-4:] == ["none", "-", "-", "expected"]
 
 
 def test_a_search_of_minutes_is_refused():

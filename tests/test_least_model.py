@@ -211,25 +211,22 @@ def test_shell(capsys, tmp_path):
     assert "asked must be some of" in err
 
 
-def test_design_says_where_the_vacuum_fails(capsys, tmp_path):
+def test_a_design_is_by_the_model_that_holds(capsys, tmp_path):
     (tmp_path / "wet.toml").write_text(PAGE_SCENE)
-    arguments = ("design", "--scene", tmp_path / "wet.toml", "--depth", "120 m", "--atlas", tmp_path / "none.nc")
-    code, out, err = run(capsys, *arguments, "--json")
+    arguments = ("design", "--scene", tmp_path / "wet.toml", "--depth", "120 m")
+    code, out, _ = run(capsys, *arguments, "--json")
     assert code == 0
-    (row,) = json.loads(out)["cables"]
-    assert row["expected"]
-    by = row["by_model"]
+    answer = json.loads(out)
+    (row,) = answer["cables"]
+    assert (row["expected"], answer["model"]) == (True, "water")
+    assert "vacuum differs from" in answer["model_reason"]
     exact = solve_model(replace(make_scene(tomllib.loads(PAGE_SCENE)), length=row["length_m"]), "water")
-    assert (by["model"], by["nodes"]) == ("water", exact.nodes)
-    assert [by["x_f_m"], by["y_f_m"], by["z_f_m"]] == pytest.approx(list(exact.position), rel=1e-9)
-    assert by["z_f_m"] < 110
-    assert "does not hold for 1 of 1 expected shapes" in err
-    assert "expected, by water 102." in run(capsys, *arguments)[1]
-    code, out, err = run(capsys, *arguments, "--model", "vacuum", "--json")
-    assert json.loads(out)["cables"][0]["by_model"] is None
-    assert "does not hold" not in err
-    arguments = ("design", "--scene", "skop-fig3", "--depth", "25 in", "--max-radius", "1 mm")
-    assert "expected, the vacuum model holds" in run(capsys, *arguments, "--atlas", tmp_path / "none.nc")[1]
+    assert [row["x_f_m"], row["y_f_m"], row["z_f_m"]] == pytest.approx(list(exact.position), rel=1e-9)
+    assert (row["nodes"], row["z_f_m"]) == (exact.nodes, pytest.approx(120.0, rel=1e-10))
+    assert "model: water; vacuum differs" in run(capsys, *arguments)[1]
+    assert json.loads(run(capsys, *arguments, "--model", "vacuum", "--json")[1])["model"] == "vacuum"
+    out = run(capsys, "design", "--scene", "skop-fig3", "--depth", "25 in", "--max-radius", "1 mm")[1]
+    assert "model: vacuum; vacuum agrees with air and water" in out
 
 
 def test_questions_are_named_in_help(capsys):

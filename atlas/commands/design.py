@@ -1,17 +1,13 @@
-"""`towatlas design`: the cable that puts the fish at a depth."""
+"""`towatlas design`: the cables that put the fish at a depth, at a distance from the axis, or pull with a force."""
 
 import argparse
 import math
 from typing import Any
 
-import numpy as np
-
-from towatlas.commands.common import NO_STATE, OK, add_atlas, add_patience, print_json, say
-from towatlas.commands.scene import add_speed, atlas_if_any, describe_speed, quantity, scene_of
-from towatlas.scene.choice import Choice
-from towatlas.scene.designs import Design, design
+from towatlas.commands.common import FAILED, NO_STATE, OK, add_patience, print_json, real, say
+from towatlas.commands.scene import add_speed, describe_speed, quantity, scene_of
+from towatlas.scene.designs import LOOKED, UNITS, Cable, Design, design
 from towatlas.scene.scene import MODELS
-from towatlas.solve.equilibria import equilibria
 
 
 def add(commands: Any) -> None:
@@ -19,14 +15,20 @@ def add(commands: Any) -> None:
     parser = commands.add_parser(
         "design",
         help="cable lengths that put the fish of a scene at a depth",
-        description="All cable lengths that put the fish at a depth below the plane of the towing circle, by the "
-        "vacuum model, with the distance to the nearest critical speed. The length in the scene is not used. For each "
-        "expected shape the least model says where the fish hangs with drag and buoyancy.",
+        description="All cable lengths that put the fish at a depth below the plane of the towing circle or at a "
+        "distance from the axis, or pull with a force at the tow point, by the least model that holds for each cable "
+        "expected, with the nearest jump of each. The length in the scene is not used.",
     )
     parser.add_argument("--scene", required=True, metavar="FILE", help="a scene, or the name of one that is shipped")
-    parser.add_argument("--depth", type=quantity("m"), required=True, metavar="D", help="as 120m; bare: m")
+    wanted = parser.add_mutually_exclusive_group(required=True)
+    wanted.add_argument("--depth", type=quantity("m"), metavar="D", help="of the fish, as 120m; bare: m")
+    wanted.add_argument("--radius", type=quantity("m"), metavar="R", help="of the fish from the axis, as 20m; bare: m")
+    wanted.add_argument("--tension", type=quantity("N"), metavar="T", help="at the tow point, as 900N; bare: N")
     parser.add_argument(
         "--max-radius", type=quantity("m"), default=math.inf, metavar="R", help="farthest from the axis; default: any"
+    )
+    parser.add_argument(
+        "--max-tension", type=quantity("N"), default=math.inf, metavar="T", help="at the tow point; default: any"
     )
     parser.add_argument(
         "--max-length",
@@ -34,11 +36,8 @@ def add(commands: Any) -> None:
         metavar="L",
         help="longest cable searched; default 10 times the distance from the tow point to the axis at that depth",
     )
-    parser.add_argument(
-        "--model", choices=MODELS, help="says where the fish hangs; vacuum: no other is solved; default: the least"
-    )
+    parser.add_argument("--model", choices=MODELS, help="this one, compared with no other; default: the least")
     add_speed(parser)
-    add_atlas(parser)
     parser.add_argument("--json", action="store_true", help="one object instead of a table")
     add_patience(parser)
     parser.set_defaults(run=_run)
@@ -46,121 +45,100 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     scene = scene_of(options.scene, options)
-    atlas = atlas_if_any(options.atlas)
     found = design(
         scene,
         options.depth,
-        options.max_radius,
-        options.max_length,
-        atlas,
+        radius=options.radius,
+        tension=options.tension,
+        max_radius=options.max_radius,
+        max_tension=options.max_tension,
+        max_length=options.max_length,
+        model=options.model,
     )
-    choices = {}
-    if options.model != "vacuum":
-        choices = found.choices(options.model)
-    rows = _rows(found, choices)
-    reason = None if rows else _reason(found)
+    rows = [_row(found, cable) for cable in found.chosen]
+    reason = None if rows else _reason(found, options)
     if options.json:
         answer = {
             "file": scene.source,
-            "model": "vacuum",
+            "model": found.model,
+            "model_reason": found.reason,
             "gamma": scene.gamma,
-            "depth_m": found.depth,
-            "max_radius_m": found.max_radius if math.isfinite(found.max_radius) else None,
+            "wanted": found.quantity,
+            f"{found.quantity}_{UNITS[found.quantity]}": found.value,
+            "max_radius_m": real(options.max_radius),
+            "max_tension_N": real(options.max_tension),
             "longest_searched_m": found.longest,
+            "complete": found.complete,
             "cables": rows,
             "reason": reason,
         }
         print_json(answer)
     elif rows:
         print(_text(found, rows))
+    if not found.complete:
+        say("not everywhere made out: cables may be missing")
     if reason:
         say(reason)
-        return NO_STATE
-    if (warning := _warning(rows, options.model is not None)) is not None:
-        say(warning)
+        return NO_STATE if found.complete else FAILED
     return OK
 
 
-def _rows(found: Design, choices: dict[int, Choice]) -> list[dict[str, Any]]:
-    scene, cables = found.scene, found.cables
-    force = scene.force_unit()
-    rows = []
-    for k in np.flatnonzero(found.chosen):
-        jumps = found.jumps[k]
-        row: dict[str, Any] = {
-            "length_m": float(cables.lam[k] * scene.radius),
-            "nodes": int(cables.nodes[k]),
-            "expected": bool(found.expected[k]),
-            "x_f_m": float(cables.x_f[k] * scene.radius),
-            "tension_N": float(cables.tension[k] * force),
-            "nearest_n": None,
-            "nearest_gamma": None,
-            "distance_gamma": None,
-            "distance_relative": None,
-            "distance_m_s": None,
-            "by_model": _by_model(choices[int(k)]) if int(k) in choices else None,
-        }
-        at = jumps.nearest(scene.gamma)
-        if at >= 0:
-            distance = float(jumps.gamma[at]) - scene.gamma
-            row |= {
-                "nearest_n": int(jumps.n[at]),
-                "nearest_gamma": float(jumps.gamma[at]),
-                "distance_gamma": distance,
-                "distance_relative": distance / scene.gamma,
-                "distance_m_s": float(scene.speed_of(distance)),
-            }
-        rows.append(row)
-    return rows
-
-
-def _by_model(choice: Choice) -> dict[str, Any]:
-    """Where the fish hangs by the least model."""
-    answer = choice.answer
-    x, y, z = answer.position.tolist()
-    return {
-        "model": choice.model,
-        "reason": choice.reason,
-        "nodes": answer.nodes,
+def _row(found: Design, cable: Cable) -> dict[str, Any]:
+    scene = found.scene
+    x, y, z = cable.position.tolist()
+    row: dict[str, Any] = {
+        "length_m": cable.length,
+        "error": real(cable.error),
+        "shape": cable.shape,
+        "shapes": cable.shapes,
+        "expected": cable.expected,
+        "nodes": cable.nodes,
         "x_f_m": x,
         "y_f_m": y,
         "z_f_m": z,
-        "tension_N": answer.tension,
+        "r_f_m": cable.radius,
+        "phase_deg": cable.phase_deg,
+        "tension_N": cable.tension,
+        "jumps_looked_at": [scene.gamma * share for share in LOOKED],
+        "jumps_complete": cable.jumps.complete,
+        "nearest_gamma": None,
+        "distance_gamma": None,
+        "distance_relative": None,
+        "distance_m_s": None,
+        "nearest_shapes_below": None,
+        "nearest_shapes_above": None,
     }
+    at = cable.nearest(scene.gamma)
+    if at >= 0:
+        distance = float(cable.jumps.gamma[at]) - scene.gamma
+        row |= {
+            "nearest_gamma": float(cable.jumps.gamma[at]),
+            "distance_gamma": distance,
+            "distance_relative": distance / scene.gamma,
+            "distance_m_s": float(scene.speed_of(distance)),
+            "nearest_shapes_below": int(cable.jumps.shapes_below[at]),
+            "nearest_shapes_above": int(cable.jumps.shapes_above[at]),
+        }
+    return row
 
 
-def _warning(rows: list[dict[str, Any]], forced: bool) -> str | None:
-    """What the vacuum model is worth here."""
-    larger = [row for row in rows if row["by_model"] and row["by_model"]["model"] != "vacuum"]
-    if not larger:
-        return None
-    first = larger[0]
-    if forced:
-        return (
-            f"lengths are by the vacuum model; with {first['length_m']:.6g} m the fish hangs "
-            f"{first['by_model']['z_f_m']:.6g} m deep by {first['by_model']['model']}"
-        )
-    return (
-        f"lengths are by the vacuum model, which does not hold for {len(larger)} of "
-        f"{sum(row['expected'] for row in rows)} expected shapes: with {first['length_m']:.6g} m, "
-        f"{first['by_model']['reason']}"
+def _reason(found: Design, options: argparse.Namespace) -> str:
+    """Why there is none, and the nearest there is."""
+    unit = UNITS[found.quantity]
+    wanted = (
+        f"up to {found.longest:.4g} m with a {found.quantity} of {found.value:.6g} {unit} by the {found.model} model"
     )
-
-
-def _reason(found: Design) -> str:
-    scene, cables = found.scene, found.cables
-    if not len(cables):
-        shapes = equilibria(found.longest / scene.radius, scene.system("vacuum").w_f, scene.gamma)
-        deepest = float(shapes.z_f.max()) * scene.radius
+    if found.cables:
+        limits = options.max_radius, options.max_tension
+        nearest = min(found.cables, key=lambda cable: max(cable.radius / limits[0], cable.tension / limits[1]))
         return (
-            f"no cable up to {found.longest:.4g} m has an equilibrium with the fish at {found.depth:.6g} m: the "
-            f"deepest of the longest one is at {deepest:.6g} m; a longer one may, with --max-length, or a slower tow"
+            f"none of the {len(found.cables)} cables {wanted} is within the limits: nearest comes one of "
+            f"{nearest.length:.6g} m, with the fish {nearest.radius:.6g} m from the axis and {nearest.tension:.6g} N "
+            "at the tow point"
         )
-    nearest = int(np.argmin(np.abs(cables.x_f)))
     return (
-        f"none of the {len(cables)} cables up to {found.longest:.4g} m with the fish at {found.depth:.6g} m has it "
-        f"within {found.max_radius:.6g} m of the axis; nearest to it, {abs(cables.x_f[nearest]) * scene.radius:.6g} m, "
-        f"comes a cable of {cables.lam[nearest] * scene.radius:.6g} m with {cables.nodes[nearest]} nodes"
+        f"no cable {wanted}: there are {found.least:.6g} to {found.most:.6g} {unit}; a longer one may, with "
+        "--max-length, or another speed"
     )
 
 
@@ -169,24 +147,26 @@ def _text(found: Design, rows: list[dict[str, Any]]) -> str:
     lines = [
         scene.title or scene.source,
         describe_speed(scene),
-        f"fish at {found.depth:.6g} m, cables up to {found.longest:.4g} m (vacuum model); nearest jump: its number, "
-        "critical speed less the scene's; of expected shapes, where the fish hangs by the least model",
+        f"{found.quantity} of {found.value:.6g} {UNITS[found.quantity]}, cables up to {found.longest:.4g} m",
+        f"model: {found.model}; {found.reason}",
+        f"nearest jump: between {LOOKED[0]:g} and {LOOKED[1]:g} times the speed, its speed less the scene's",
         "",
-        f"{'length m':>13} {'nodes':>5} {'fish x m':>13} {'tension N':>13} {'n':>4} {'%':>8} {'gamma':>9} {'m/s':>9}",
+        f"{'length m':>13} {'nodes':>5} {'fish x m':>11} {'y m':>11} {'depth m':>11} {'tension N':>11} {'shape':>7} "
+        f"{'jump %':>8} {'m/s':>9} {'shapes':>8}",
     ]
     for row in rows:
-        cells = f"{row['length_m']:>13.8g} {row['nodes']:>5} {row['x_f_m']:>13.6g} {row['tension_N']:>13.6g}"
-        if row["nearest_n"] is None:
-            jump = f" {'-':>4} {'-':>8} {'-':>9} {'-':>9}"
+        cells = (
+            f"{row['length_m']:>13.8g} {row['nodes']:>5} {row['x_f_m']:>11.5g} {row['y_f_m']:>11.5g} "
+            f"{row['z_f_m']:>11.5g} {row['tension_N']:>11.5g} {_of(row):>7}"
+        )
+        if row["nearest_gamma"] is None:
+            jump = f" {'none':>8} {'-':>9} {'-':>8}"
         else:
-            jump = (
-                f" {row['nearest_n']:>4} {100 * row['distance_relative']:>+8.2f} {row['distance_gamma']:>+9.4g} "
-                f"{row['distance_m_s']:>+9.4g}"
-            )
-        by = row["by_model"]
-        hangs = ""
-        if by:
-            hangs = f", by {by['model']} {by['z_f_m']:.6g} m deep, {by['nodes']} nodes"
-            hangs = ", the vacuum model holds" if by["model"] == "vacuum" else hangs
-        lines.append(cells + jump + (f"  expected{hangs}" if row["expected"] else ""))
+            shapes = f"{row['nearest_shapes_below']} to {row['nearest_shapes_above']}"
+            jump = f" {100 * row['distance_relative']:>+8.2f} {row['distance_m_s']:>+9.4g} {shapes:>8}"
+        lines.append(cells + jump + ("  expected" if row["expected"] else ""))
     return "\n".join(lines)
+
+
+def _of(row: dict[str, Any]) -> str:
+    return f"{row['shape'] + 1} of {row['shapes']}"

@@ -97,6 +97,28 @@ def solvable_models(scene: Scene) -> tuple[list[str], list[str]]:
     return known, [model for model in MODELS if model not in known]
 
 
+def system_of(scene: Scene, model: str) -> System:
+    """The groups of a scene by a model, as what is solved.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : str
+        One of MODELS.
+
+    Returns
+    -------
+    System
+
+    Raises
+    ------
+    ValueError
+        If this model has no such cable, as one that nothing holds down or up.
+    """
+    groups = scene.system(check_model(model))
+    return System.of(groups.lam, groups.w_f, C=groups.C, m_f=groups.m_f, C_f=groups.C_f, w=groups.w)
+
+
 def solve_model(
     scene: Scene, model: str, looked: tuple[float, float] | None = None, vacuum: Folds | None = None
 ) -> ModelAnswer:
@@ -123,8 +145,7 @@ def solve_model(
     ArithmeticError
         If the computation overflows or does not converge.
     """
-    groups = scene.system(check_model(model))
-    system = System.of(groups.lam, groups.w_f, C=groups.C, m_f=groups.m_f, C_f=groups.C_f, w=groups.w)
+    system = system_of(scene, model)
     found = solve_equilibria(system, scene.gamma)
     k = found.expected
     if k < 0:

@@ -12,7 +12,6 @@ from towatlas.numerics.hermite import cubic, cubic_coefficients
 from towatlas.numerics.rows import EPS, newton, solve_systems
 from towatlas.solve.jets import jets_of
 from towatlas.solve.paths import Path, Trace, trace
-from towatlas.solve.search import search
 from towatlas.solve.shots import Array, Ends, Integers
 from towatlas.system import System
 
@@ -20,8 +19,6 @@ JETS = jets_of(1, parameter=True)
 ROUNDS, SETTLED, ROUNDINGS, SAME = 24, 1e-11, 64.0, 1e-8
 # A root may lie so far beyond the piece of a branch on which a cubic has it, in the logarithms of length and radius.
 BEYOND = 0.05
-# A shape found by itself is the one meant where the logarithm of its radius is this near.
-NEAR = 1e-5
 QUANTITIES = ("depth", "radius", "tension")
 Booleans = NDArray[np.bool_]
 
@@ -44,12 +41,8 @@ class Lengths:
         Length over tow radius [-], > 0.
     error : ndarray, shape (cables,)
         Estimated relative error of lam [-], > 0.
-    place : ndarray of int, shape (cables,)
-        Which of the shapes of that cable it is, from the axis outwards, >= 0.
-    shapes : ndarray of int, shape (cables,)
-        How many it has, >= 1.
-    x : ndarray, shape (cables,)
-        log of the radius of the fish over g / Omega^2.
+    r_f : ndarray, shape (cables,)
+        Distance of the fish from the axis over tow radius [-], > 0.
     least, most : float
         Of the quantity, over all shapes looked at.
     complete : bool
@@ -62,9 +55,7 @@ class Lengths:
     value: float
     lam: Array
     error: Array
-    place: Integers
-    shapes: Integers
-    x: Array
+    r_f: Array
     least: float
     most: float
     complete: bool
@@ -96,7 +87,7 @@ def cables_for(system: System, gamma: float, quantity: str, value: float, longes
     -----
     All shapes are found at lengths close enough for each to be plainly one of the next (`trace`); along the pieces
     between, cubics through the quantity and its slope say where it has the value, and Newton's method finds the length
-    and the shape there together. Each is looked for among all shapes of its length by themselves.
+    and the shape there together.
     """
     path = Path(system.row(), gamma, ("lam",))
     traced = trace(path, 0.0, float(np.log(longest / system.lam)))
@@ -110,8 +101,6 @@ def cables_for(system: System, gamma: float, quantity: str, value: float, longes
     z, error = z[order], error[order]
     new = np.array([not (np.abs(z[:k] - z[k]).max(axis=1) < SAME).any() for k in range(len(z))], bool)
     z, error = z[new], error[new]
-    place, shapes, confirmed = _places(path, z)
-    z, error, place, shapes = z[confirmed], error[confirmed], place[confirmed], shapes[confirmed]
     return Lengths(
         system=system,
         gamma=gamma,
@@ -119,27 +108,11 @@ def cables_for(system: System, gamma: float, quantity: str, value: float, longes
         value=value,
         lam=system.lam * np.exp(z[:, 1]),
         error=error,
-        place=place,
-        shapes=shapes,
-        x=z[:, 0],
+        r_f=np.exp(z[:, 0]) / gamma**2,
         least=least,
         most=most,
-        complete=traced.certain and bool(confirmed.all()),
+        complete=traced.certain,
     )
-
-
-def _places(path: Path, z: Array) -> tuple[Integers, Integers, Booleans]:
-    """Which of all shapes of its length each is, how many there are, and whether it is one of them."""
-    place, shapes, confirmed = np.zeros(len(z), np.int64), np.zeros(len(z), np.int64), np.zeros(len(z), bool)
-    if not len(z):
-        return place, shapes, confirmed
-    found = search(*path.at(z[:, 1]))
-    for k in range(len(z)):
-        x = found.x[found.row == k]
-        if len(x):
-            shapes[k], place[k] = len(x), np.argmin(np.abs(x - z[k, 0]))
-            confirmed[k] = abs(x[place[k]] - z[k, 0]) < NEAR
-    return place, shapes, confirmed
 
 
 class _Target:
