@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from towatlas.scene.designs import design
     from towatlas.scene.file import read_scene
     from towatlas.scene.jumps import answer_scene
+    from towatlas.scene.sweeps import sweep
     from towatlas.solve.critical import solve_critical
     from towatlas.solve.cusps import cusps
     from towatlas.solve.drag_folds import solve_drag_folds
@@ -51,6 +52,7 @@ __all__ = [
     "shape_of",
     "solve_critical",
     "solve_drag_folds",
+    "sweep",
     "threshold_length",
 ]
 
@@ -62,6 +64,7 @@ _HOMES = {
     "scene.designs": ("design",),
     "scene.file": ("read_scene",),
     "scene.jumps": ("answer_scene",),
+    "scene.sweeps": ("sweep",),
     "solve.critical": ("solve_critical",),
     "solve.cusps": ("cusps",),
     "solve.drag_folds": ("solve_drag_folds",),
