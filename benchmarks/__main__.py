@@ -6,7 +6,7 @@ import time
 
 import numba
 
-from benchmarks import coldstart, figures, folds, lookup, report, shots, targets
+from benchmarks import coldstart, drag, figures, folds, lookup, report, shots, targets
 from benchmarks.peers_shots import missing
 from benchmarks.samples import ROOT
 from benchmarks.timing import Row
@@ -67,6 +67,7 @@ def main() -> int:
     lookup_rows, construct = lookup.measure(table)
     found += targets.of_lookup(lookup_rows)
     numba.set_num_threads(threads)
+    found += drag.run(_say)
     worst = lookup.whole_domain(table)
     shell = lookup.shell(default_path())
 

@@ -1,4 +1,4 @@
-"""The three charts: error against time, both logarithmic, failures marked."""
+"""The charts: error against time, both logarithmic, failures marked."""
 
 from pathlib import Path
 
@@ -39,6 +39,16 @@ STYLES = {
     "SciPy solve_ivp + root": ("#1b7f3b", "s"),
     "SciPy solve_bvp": ("#e07a00", "D"),
     "this project": (OURS, "*"),
+    "equilibria_many": (OURS, "*"),
+    "equilibria, one a call": (OURS, "*"),
+    "SciPy up from the fish": ("#1b7f3b", "s"),
+    "SciPy down from the tow": ("black", "v"),
+    "MoorDyn": ("#2f7ed8", "^"),
+    "solve_drag_folds, many": (OURS, "*"),
+    "solve_drag_folds, one a call": (OURS, "*"),
+    "Newton, the guesses of the peers": (OURS, "*"),
+    "folds": (OURS, "*"),
+    "counts of shapes": ("#6f4518", "X"),
     "RegularGridInterpolator linear": ("#2f7ed8", "s"),
     "RegularGridInterpolator cubic": ("#0b3c8c", "D"),
     "RectBivariateSpline": ("#1b7f3b", "^"),
@@ -118,14 +128,29 @@ def folds(rows: list[Row], path: Path) -> None:
     }
     # Where the share of lost answers stands: beside the symbols of its method that the others leave free.
     sides = {"Skop's scan": ((0, -19), "center"), "SciPy solve_ivp + root": ((-10, -3), "right")}
+    _labelled(axes, rows, "gamma", marks, sides)
+    axes.set_title("Critical speeds from cold, over the whole domain of the atlas", loc="left")
+    figure.text(0.1, -0.02, KEY, fontsize=8)
+    _finish(figure, path)
+
+
+def _labelled(
+    axes: Axes, rows: list[Row], name: str, marks: dict[str, tuple], sides: dict, legend: str = "lower right"
+) -> None:
+    """Our symbols named beside them, the others in a legend, with the share of answers lost beside theirs."""
     colours = {line.get_label(): line.get_color() for line in axes.get_lines()}
+    named: set[str] = set()
     for row in rows:
-        place = (row.microseconds, max(row.quantile("gamma", 0.99), FLOOR))
+        place = (row.microseconds, max(row.quantile(name, 0.99), FLOOR))
+        if row.method in named:
+            continue
         if row.method in marks:
+            named.add(row.method)
             text, offset, side = marks[row.method]
+            text += f", {row.failure_rate:.0%} lost" if row.failure_rate > 0.0 else ""
             axes.annotate(text, place, offset, textcoords="offset points", color=OURS, ha=side, fontsize=8.5)
         elif row.failure_rate > 0.0:
-            offset, side = sides.get(row.method, ((10, -3), "left"))
+            offset, side = sides.get((row.method, row.setting), sides.get(row.method, ((10, -3), "left")))
             text = f"{row.failure_rate:.0%} lost"
             axes.annotate(
                 text, place, offset, textcoords="offset points", fontsize=8, ha=side, color=colours[row.method]
@@ -134,9 +159,61 @@ def folds(rows: list[Row], path: Path) -> None:
     axes.set_xlim(low / 3.0, high * 3.0)
     handles, labels = axes.get_legend_handles_labels()
     kept = [(h, text) for h, text in zip(handles, labels, strict=True) if text not in marks]
-    axes.legend(*zip(*kept, strict=True), loc="lower right", frameon=False)
-    axes.set_title("Critical speeds from cold, over the whole domain of the atlas", loc="left")
+    axes.legend(*zip(*kept, strict=True), loc=legend, frameon=False)
+
+
+def drag_equilibria(rows: list[Row], path: Path) -> None:
+    """Equilibria with drag."""
+    figure, axes = plt.subplots(figsize=(8.5, 5.6))
+    panel(axes, rows, "r_f")
+    axes.set(xlabel="time per system [us], one thread", ylabel="relative error of r_f [-]")
+    axes.set_ylim(FLOOR, 1e1)
+    marks = {
+        "equilibria_many": ("many at once", (2, 9), "right"),
+        "equilibria, one a call": ("one a call", (-2, 9), "left"),
+    }
+    fish, tow = "SciPy up from the fish", "SciPy down from the tow"
+    sides = {
+        "SciPy solve_bvp": ((-10, -8), "right"),
+        (fish, "rtol 1e-10, 60 radii"): ((8, -12), "left"),
+        (fish, "rtol 1e-07, 240 radii"): ((-9, 3), "right"),
+        (fish, "rtol 1e-07, 960 radii"): ((10, -8), "left"),
+        (tow, "rtol 0.0001, 12 guesses"): ((0, 11), "center"),
+        (tow, "rtol 1e-07, 12 guesses"): ((3, 10), "left"),
+        (tow, "rtol 1e-10, 12 guesses"): ((8, -12), "left"),
+        (tow, "rtol 1e-07, 48 guesses"): ((0, 11), "center"),
+    }
+    _labelled(axes, rows, "r_f", marks, sides)
+    axes.set_title("All equilibria of random systems in air and in water", loc="left")
     figure.text(0.1, -0.02, KEY, fontsize=8)
+    _finish(figure, path)
+
+
+def drag_folds(pairs: list[Row], octaves: list[Row], path: Path) -> None:
+    """Folds with drag: one, and all within an octave of speed."""
+    figure, both = plt.subplots(1, 2, figsize=(12.5, 5.4), sharey=True)
+    marks = {
+        "solve_drag_folds, many": ("whole curve,\nmany", (0, 9), "center"),
+        "solve_drag_folds, one a call": ("whole curve,\none a call", (0, 9), "center"),
+        "Newton, the guesses of the peers": ("Newton", (0, 12), "center"),
+        "folds": ("folds", (0, 9), "center"),
+    }
+    sides = {
+        "SciPy solve_bvp": ((-10, -8), "right"),
+        ("SciPy solve_bvp", "tol 1e-09"): ((10, -3), "left"),
+        ("SciPy solve_ivp + root", "rtol 1e-10"): ((-10, -10), "right"),
+        "counts of shapes": ((0, 11), "center"),
+    }
+    titles = "A pair appears, with drag", "All folds within an octave of speed, with drag"
+    units = "time per fold [us], one thread", "time per octave [us], one thread"
+    for axes, rows, title, unit in zip(both, (pairs, octaves), titles, units, strict=True):
+        panel(axes, rows, "gamma")
+        axes.set_xlabel(unit)
+        axes.set_title(title, loc="left")
+        _labelled(axes, rows, "gamma", marks, sides, "upper right")
+    both[0].set_ylim(FLOOR, 1e1)
+    both[0].set_ylabel("relative error of gamma [-]")
+    figure.text(0.1, -0.03, KEY, fontsize=8.5)
     _finish(figure, path)
 
 

@@ -84,20 +84,20 @@ class FoldReference:
         return np.abs((gamma - self.gamma[0]) - self.gamma[1]) / self.gamma[0]
 
 
-def _columns(path: Path) -> dict[str, list[str]]:
+def columns(path: Path) -> dict[str, list[str]]:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
-def _doubles(texts: list[str]) -> Array:
+def doubles(texts: list[str]) -> Array:
     return np.array([float(text) for text in texts])
 
 
-def _pair(texts: list[str]) -> tuple[Array, Array]:
+def pair(texts: list[str]) -> tuple[Array, Array]:
     from mpmath import mp
 
-    high = _doubles(texts)
+    high = doubles(texts)
     with mp.workdps(DIGITS + 5):
         low = np.array([float(mp.mpf(text) - mp.mpf(value)) for text, value in zip(texts, high, strict=True)])
     return high, low
@@ -105,19 +105,19 @@ def _pair(texts: list[str]) -> tuple[Array, Array]:
 
 def shot_reference() -> ShotReference:
     """Answers of `shots(SHOTS)`, from their file."""
-    c = _columns(DATA / "reference_shots.csv")
-    single = {name: _doubles(c[name]) for name in ("a", "mu", "tau", "f", "amplitude", "q_amplitude")}
-    return ShotReference(**single, p=_pair(c["p"]), q=_pair(c["q"]))
+    c = columns(DATA / "reference_shots.csv")
+    single = {name: doubles(c[name]) for name in ("a", "mu", "tau", "f", "amplitude", "q_amplitude")}
+    return ShotReference(**single, p=pair(c["p"]), q=pair(c["q"]))
 
 
 def fold_reference() -> FoldReference:
     """Answers of `cables(FOLDS)`, from their file."""
-    c = _columns(DATA / "reference_folds.csv")
+    c = columns(DATA / "reference_folds.csv")
     return FoldReference(
         n=np.array([int(text) for text in c["n"]]),
-        w_f=_doubles(c["w_f"]),
-        lam=_doubles(c["lam"]),
-        gamma=_pair(c["gamma"]),
+        w_f=doubles(c["w_f"]),
+        lam=doubles(c["lam"]),
+        gamma=pair(c["gamma"]),
     )
 
 

@@ -6,7 +6,21 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks import figures, folds, lookup, methods_shots, peers_folds, report, samples, shots, targets
+from benchmarks import (
+    drag,
+    figures,
+    folds,
+    lookup,
+    methods_shots,
+    peers_drag,
+    peers_folds,
+    report,
+    samples,
+    samples_drag,
+    shots,
+    targets,
+    targets_drag,
+)
 from benchmarks.timing import LOST, Row
 
 
@@ -86,6 +100,57 @@ def test_peers_find_the_fold():
     near = np.log([0.95, 0.465])
     curve = peers_folds.bvp_curve(1, 1.0, np.array([10.0, 10.1]), near, tolerance=1e-6)
     assert curve[0] == pytest.approx(0.466173258416, rel=1e-6)
+
+
+def test_the_files_with_drag_hold_what_they_say():
+    """Systems are drawn anew, the shapes of a short shot and a fold computed anew."""
+    exact = samples_drag.shape_reference()
+    drawn = [samples_drag.SAMPLES[family](samples_drag.SYSTEMS) for family in samples_drag.FAMILIES]
+    assert exact.systems == [system for systems, _ in drawn for system in systems]
+    np.testing.assert_array_equal([given["gamma"] for given in exact.given], np.concatenate([g for _, g in drawn]))
+    k = int(np.flatnonzero(exact.row == 8)[0])
+    again = samples_drag.exact_shape(exact.exact[0][k], exact.given[8]["gamma"], exact.systems[8])
+    assert np.longdouble(again) == pytest.approx(exact.exact[0][k], rel=1e-15)
+    folds_ = samples_drag.fold_reference("octaves")
+    gamma = float(folds_.exact[0][0])
+    near = drag.towatlas.folds(gamma=(0.99 * gamma, 1.01 * gamma), **samples_drag.named(folds_.systems[0]))
+    assert float(samples_drag.exact_fold(float(near.r_f[0]), gamma, folds_.systems[0])) == pytest.approx(
+        gamma, rel=1e-15
+    )
+
+
+def test_equilibria_with_drag(tmp_path):
+    rows = {row.method: row for row in drag.equilibria(np.array([3, 19, 42]), full=False)}
+    for method in (drag.MANY, "equilibria, one a call"):
+        assert rows[method].quantile("r_f", 1.0) < 1e-12
+        assert rows[method].failures == "3 of 3 systems whole"
+    # Where there is one shape, the SciPy methods find it.
+    assert rows["SciPy up from the fish"].quantile("r_f", 0.5) < 1e-6
+    assert rows["SciPy down from the tow"].quantile("r_f", 0.5) < 1e-6
+    assert rows["SciPy solve_bvp"].quantile("r_f", 0.5) < 1e-3
+    figures.drag_equilibria(list(rows.values()), tmp_path / "drag")
+    assert {path.suffix for path in tmp_path.iterdir()} == {".svg", ".png"}
+
+
+def test_folds_with_drag(tmp_path):
+    pairs, octaves = drag.pairs(2, full=False), drag.octaves(1, full=False)
+    worst = {row.method: row.quantile("gamma", 1.0) for row in (*pairs, *octaves)}
+    assert worst[drag.PAIRS] < 1e-12
+    assert worst[drag.OCTAVES] < 1e-12
+    assert worst["counts of shapes"] < 1e-2
+    assert worst["SciPy solve_ivp + root"] < 1e-6
+    figures.drag_folds(pairs, octaves, tmp_path / "drag")
+
+
+def test_a_bare_tip_of_the_peers_is_ours():
+    system = samples_drag.System(3.0, 0.0, 0.0, C=1.0)
+    found = drag.towatlas.equilibria(gamma=0.8, **samples_drag.named(system))
+    radii = peers_drag.from_fish(system, 0.8, 1e-10, 20)
+    np.testing.assert_allclose(radii, found.r_f, rtol=1e-8)
+
+
+def test_targets_with_drag():
+    assert all(target.value > 0.0 for target in targets_drag.measure(8, (2, 2), 16, full=False))
 
 
 def test_lookup(table):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 # An answer further off than this, over the local amplitude (shots) or relatively (folds, lookup), is no answer.
 LOST = 1e-2
-PACKAGES = ("numpy", "numba", "scipy", "heyoka", "CyRK", "xarray")
+PACKAGES = ("numpy", "numba", "scipy", "heyoka", "CyRK", "moordyn", "xarray")
 
 
 @dataclass(frozen=True)
