@@ -168,13 +168,13 @@ def add_atlas(parser: argparse.ArgumentParser) -> None:
 FIGURE_FORMATS = (".svg", ".png", ".pdf")
 
 
-def new_figure(width: float, height: float, layout: str = "constrained") -> Any:
-    """A figure and its axes, drawn without a screen, the same bytes every time."""
+def new_figure(width: float, height: float, layout: str = "constrained", rows: int = 1) -> Any:
+    """A figure and its axes, one above the other, drawn without a screen, the same bytes every time."""
     os.environ["MPLBACKEND"] = "Agg"
     import matplotlib.pyplot as plt
 
     plt.rcParams["svg.hashsalt"] = "towatlas"
-    return plt.subplots(figsize=(width, height), layout=layout)
+    return plt.subplots(rows, figsize=(width, height), layout=layout)
 
 
 def save_figure(figure: Any, path: Path) -> None:

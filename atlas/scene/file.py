@@ -3,6 +3,8 @@
 import difflib
 import os
 import tomllib
+from collections.abc import Mapping
+from contextlib import suppress
 from importlib import resources
 from importlib.resources.abc import Traversable
 from math import pi, sqrt
@@ -73,13 +75,15 @@ def shipped_scenes() -> list[str]:
     return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
-def read_scene(path: str | os.PathLike) -> Scene:
+def read_scene(path: str | os.PathLike, changes: Mapping[str, Any] | None = None) -> Scene:
     """Read a scene.
 
     Parameters
     ----------
     path : path
         A TOML file, or the name of a scene that comes with the package, `shipped_scenes()`. A file goes first.
+    changes : mapping, optional
+        Other values of some keys, as {"fish.mass": "9 kg"}; a text that is a number is one.
 
     Returns
     -------
@@ -124,9 +128,26 @@ def read_scene(path: str | os.PathLike) -> Scene:
         # What Python's reader of TOML does not refuse itself: whole numbers of thousands of digits, deep nesting.
         raise SceneFileError(f"{path} is no scene: a number is too long, or tables are nested too deep") from None
     try:
+        for key, value in (changes or {}).items():
+            _change(table, key, value)
         return make_scene(table, os.fspath(path))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
+
+
+def _change(table: dict[str, Any], key: str, value: Any) -> None:
+    """Put another value of a key into the tables of a scene; a speed takes the place of that of any other kind."""
+    section, _, name = key.rpartition(".")
+    if isinstance(value, str):
+        with suppress(ValueError):
+            value = float(value)
+    holder = table.setdefault(section, {}) if section else table
+    if not isinstance(holder, dict):
+        raise ValueError(f"{section} must be a table")
+    if key in SPEED_KEYS or f"{section}.{name}" in SPEED_KEYS or (section == "tow" and name in SPEED_KEYS):
+        for other in SPEED_KEYS:
+            holder.pop(other.rpartition(".")[2], None)
+    holder[name] = value
 
 
 def make_scene(table: dict[str, Any], source: str = "") -> Scene:
