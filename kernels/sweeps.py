@@ -18,8 +18,8 @@ from towatlas.kernels.scan import forward_shots, scan_system
 SHOTS_BLOCK = 256
 FOLDS_BLOCK = 128
 FORWARD_BLOCK = 1024
-# Shots with drag that a thread takes at a time.
-DRAG_BLOCK = 64
+# Shots with drag that a thread takes at a time, at least; so many times it takes some.
+DRAG_BLOCK, BLOCKS_A_THREAD = 64, 4
 
 
 def _march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts, statuses):
@@ -67,11 +67,14 @@ def _scan_systems(lam, w_f, gamma_low, gamma_high, speeds, guesses, segments, n_
 
 def shoot_drag_threads(shots: Shots, algebra: Algebra, max_steps: int, reached: Reached, begin: int, stop: int) -> None:
     """`shoot_drag` over blocks of rows, on as many threads as numba is allowed."""
-    begins = range(begin, stop, DRAG_BLOCK)
-    threads = min(len(begins), numba.get_num_threads())
+    # Few blocks, for at the end of each the longest shot leaves the other lanes idle; a few for each thread, to share.
+    threads = numba.get_num_threads()
+    block = stop - begin if threads < 2 else max(DRAG_BLOCK, -(-(stop - begin) // (BLOCKS_A_THREAD * threads)))
+    begins = range(begin, stop, block)
+    threads = min(len(begins), threads)
 
     def shoot(first: int) -> None:
-        shoot_drag(shots, algebra, max_steps, reached, first, min(stop, first + DRAG_BLOCK))
+        shoot_drag(shots, algebra, max_steps, reached, first, min(stop, first + block))
 
     if threads < 2:
         for first in begins:

@@ -193,7 +193,9 @@ class _Search:
     def _refined(self, rows: Integers, x: Array) -> tuple[Integers, Array, Array]:
         """Points halved until cubics through them tell the tow point wherever it may lie at the tow radius."""
         values = self._shoot(rows, x)
-        active = rows[1:] == rows[:-1]
+        failed = np.isnan(values[4])
+        # Between two shots that failed a third would.
+        active = (rows[1:] == rows[:-1]) & ~(failed[1:] & failed[:-1])
         for _ in range(HALVINGS):
             i = np.flatnonzero(active)
             if not len(i):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from towatlas.effort import check_patience, scaled
+from towatlas.effort import check_patience, limited, scaled
 from towatlas.kernels.system import C_S, COLUMNS, W_F, W
 from towatlas.solve.jets import Jets
 
@@ -16,8 +16,9 @@ Integers = NDArray[np.int64]
 # Of a shot: with the usual patience, and with any. More are taken by cables that all but float, bare at their end, in
 # drag so strong that they trail along their circle.
 STEPS, MOST_STEPS = 10**5, 10**7
-# Shots between two looks at the clock: at most, first and at least; about so many steps of them, some seconds.
-BATCH, FIRST_BATCH, LEAST_BATCH, STEPS_A_BATCH = 128, 32, 16, 4 * 10**6
+# Shots between two looks at the clock: at most, first and at least; about so many steps of them, some seconds. Where
+# nobody looks, so many, for at the end of each batch the longest shot leaves the other lanes idle.
+BATCH, FIRST_BATCH, LEAST_BATCH, STEPS_A_BATCH, UNWATCHED = 128, 32, 16, 4 * 10**6, 8192
 REMEDY = "a shorter cable, a lower speed or less drag makes shots shorter"
 
 
@@ -116,12 +117,13 @@ def shoot(
     turns, codes = np.empty((rows, 2), np.int64), np.empty(rows, np.int64)
     shots, algebra = Shots(r, np.square(speed), table, moved, part), Algebra(*jets.algebra)
     reached = Reached(state, steps, turns, codes)
-    begin, batch, max_steps = 0, FIRST_BATCH, scaled(STEPS, MOST_STEPS)
+    begin, batch, max_steps = 0, FIRST_BATCH if limited() else UNWATCHED, scaled(STEPS, MOST_STEPS)
     while begin < rows:
         check_patience("shots with drag", REMEDY)
         stop = min(rows, begin + batch)
         shoot_drag_threads(shots, algebra, max_steps, reached, begin, stop)
-        batch = int(np.clip(STEPS_A_BATCH / max(1.0, steps[begin:stop].mean()), LEAST_BATCH, BATCH))
+        if limited():
+            batch = int(np.clip(STEPS_A_BATCH / max(1.0, steps[begin:stop].mean()), LEAST_BATCH, BATCH))
         begin = stop
     x, y = state[:, 0, 0], state[:, 1, 0]
     # Where no drag takes the cable out of its plane the angle grows by half a turn at every crossing of the axis.
