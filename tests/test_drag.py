@@ -298,14 +298,11 @@ def test_what_a_shot_refuses():
     assert (long.status[0], long.steps[0]) == (status.STEP_LIMIT, 100_000)
     overflowing = shoot([1e200], 1.0, replace(system, lam=10.0, w_f=1.0, m_f=1e200).row(), jets_of(0))
     assert overflowing.status[0] == status.BAD_INPUT
-    with (
-        towatlas.patience(1.0),
-        pytest.raises(towatlas.TooMuchWork, match="shots with drag of about .* too many for 1 s"),
-    ):
+    with towatlas.patience(1.0), pytest.raises(towatlas.TooMuchWork, match="too many for 1 s of CPU: 3 s or more"):
         towatlas.equilibria(system.lam, 0.0, 20.0, C=system.C)
-    rows = np.tile(system.row(), (200, 1))
-    with towatlas.patience(0.5), pytest.raises(towatlas.TooMuchWork, match="shots with drag: not finished"):
-        shoot(np.full(200, 400.0), 20.0, rows, jets_of(1))
+    rows = np.tile(system.row(), (5000, 1))
+    with towatlas.patience(1.0), pytest.raises(towatlas.TooMuchWork, match="shots with drag: not finished"):
+        shoot(np.full(len(rows), 400.0), 20.0, rows, jets_of(1))
 
 
 @pytest.mark.parametrize(

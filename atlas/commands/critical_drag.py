@@ -72,7 +72,8 @@ def _all(options: argparse.Namespace, rows: list[dict[str, Any]]) -> tuple[list[
         found = folds(options.lam, options.wf, (min(speeds) / BEYOND, max(speeds) * BEYOND), C=options.C)
     except TooMuchWork as error:
         return rows, f"{PAIRS_ALONE}, as others take too long: {error}"
-    return [row_of(found, k) for k in range(len(found))], found.searched
+    changes = (found.shapes_above - found.shapes_below).tolist()
+    return [row_of(found, k) | {"change": change} for k, change in enumerate(changes)], found.searched
 
 
 def _of_pairs(pairs: DragFolds) -> list[dict[str, Any]]:

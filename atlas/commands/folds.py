@@ -64,13 +64,11 @@ def row_of(found: Folds, k: int) -> dict[str, Any]:
     -------
     dict
     """
-    below, above = int(found.shapes_below[k]), int(found.shapes_above[k])
     return {
         "gamma": float(found.gamma[k]),
         "r_f": float(found.r_f[k]),
-        "shapes_below": below,
-        "shapes_above": above,
-        "change": above - below,
+        "shapes_below": int(found.shapes_below[k]),
+        "shapes_above": int(found.shapes_above[k]),
         "n": int(found.n[k]) or None,
         "origin": str(found.origin[k]),
         "error": real(found.error[k]),
@@ -84,7 +82,7 @@ def print_folds(rows: list[dict[str, Any]]) -> None:
     Parameters
     ----------
     rows : list of dict
-        As from `row_of`; shapes_below and shapes_above may be None.
+        As from `row_of`; where shapes_below and shapes_above are None, with their `change`.
     """
     print(f"{'gamma':>20} {'r_f':>20} {'shapes':>9} {'n':>5} {'origin':>7} {'error':>8}")
     for row in rows:
