@@ -8,9 +8,10 @@ import numpy as np
 
 from towatlas.commands.common import NO_STATE, OK, add_atlas, add_patience, print_json, say
 from towatlas.commands.scene import add_speed, atlas_if_any, describe_speed, quantity, scene_of
+from towatlas.scene.angles import angles_along, extrapolation
 from towatlas.scene.choice import Choice
 from towatlas.scene.designs import Design, design
-from towatlas.scene.scene import MODELS
+from towatlas.scene.scene import MODELS, Scene
 from towatlas.solve.equilibria import equilibria
 
 
@@ -59,6 +60,7 @@ def _run(options: argparse.Namespace) -> int:
         choices = found.choices(options.model)
     rows = _rows(found, choices)
     reason = None if rows else _reason(found)
+    notes = [*scene.notes, *_extrapolations(scene, choices)]
     if options.json:
         answer = {
             "file": scene.source,
@@ -69,10 +71,13 @@ def _run(options: argparse.Namespace) -> int:
             "longest_searched_m": found.longest,
             "cables": rows,
             "reason": reason,
+            "notes": notes,
         }
         print_json(answer)
     elif rows:
         print(_text(found, rows))
+    for note in notes:
+        say(note)
     if reason:
         say(reason)
         return NO_STATE
@@ -100,18 +105,27 @@ def _rows(found: Design, choices: dict[int, Choice]) -> list[dict[str, Any]]:
             "distance_m_s": None,
             "by_model": _by_model(choices[int(k)]) if int(k) in choices else None,
         }
-        at = jumps.nearest(scene.gamma)
+        at = jumps.nearest(abs(scene.gamma))
         if at >= 0:
-            distance = float(jumps.gamma[at]) - scene.gamma
+            distance = float(jumps.gamma[at]) - abs(scene.gamma)
             row |= {
                 "nearest_n": int(jumps.n[at]),
                 "nearest_gamma": float(jumps.gamma[at]),
                 "distance_gamma": distance,
-                "distance_relative": distance / scene.gamma,
+                "distance_relative": distance / abs(scene.gamma),
                 "distance_m_s": float(scene.speed_of(distance)),
             }
         rows.append(row)
     return rows
+
+
+def _extrapolations(scene: Scene, choices: dict[int, Choice]) -> list[str]:
+    """What is said, once, of laws of the cable beyond the angles that they were measured at."""
+    for choice in choices.values():
+        found = choice.answer.equilibria
+        if text := extrapolation(scene, angles_along(scene, found, found.expected)):
+            return [text]
+    return []
 
 
 def _by_model(choice: Choice) -> dict[str, Any]:

@@ -52,7 +52,7 @@ class Design:
     @property
     def expected(self) -> NDArray[np.bool_]:
         """Which of the cables have their expected shape there: in a vacuum the median root; shape (cables,)."""
-        passed = np.array([jumps.passed(self.scene.gamma) for jumps in self.jumps], int)
+        passed = np.array([jumps.passed(abs(self.scene.gamma)) for jumps in self.jumps], int)
         return (self.cables.nodes == passed) & ~self.cables.outer
 
     def choices(self, model: str | None = None) -> dict[int, Choice]:
@@ -130,7 +130,7 @@ def design(
         raise ValueError(f"max_radius must be positive, got {max_radius:g}")
     given = LONGEST * float(np.hypot(depth, scene.radius)) if max_length is None else max_length
     longest = check_one("length", given)
-    w_f, gamma = scene.system("vacuum").w_f, scene.gamma
+    w_f, gamma = scene.system("vacuum").w_f, abs(scene.gamma)
     with patient_with(scene, f"--depth {depth:g} m, --max-length {longest:g} m", longest / scene.radius):
         cables = cables_to_depth(w_f=w_f, gamma=gamma, z_f=depth / scene.radius, lam_max=longest / scene.radius)
         jumps = [critical_speeds(lam=float(lam), w_f=w_f, gamma=gamma, atlas=atlas) for lam in cables.lam]

@@ -1,7 +1,7 @@
 """What the models of the report's Table 1 answer about a scene."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,7 +124,7 @@ def solve_model(
         If the computation overflows or does not converge.
     """
     groups = scene.system(check_model(model))
-    system = System.of(groups.lam, groups.w_f, C=groups.C, m_f=groups.m_f, C_f=groups.C_f, w=groups.w)
+    system = System.of(**asdict(groups))
     found = solve_equilibria(system, scene.gamma)
     k = found.expected
     if k < 0:
