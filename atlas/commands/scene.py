@@ -294,7 +294,9 @@ def _cable_lines(scene: Scene) -> list[str]:
     if (known := scene.cable_type) is None:
         return []
     words = [f"cable {known.name}" + (f": {known.source}" if known.source else "")]
-    words += [f"{name.replace('_', ' ')} +- {value:g}" for name, value in known.deviations.items()]
+    if known.deviations:
+        listed = ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in known.deviations.items())
+        words.append(f"standard deviations: {listed}")
     if known.angles_deg is not None:
         words.append("measured at {:.1f} to {:.1f} degrees to the stream".format(*known.angles_deg))
     return ["; ".join(words)]

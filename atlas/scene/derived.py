@@ -65,7 +65,14 @@ def circle(values: Values, gravity: float) -> tuple[float, float]:
     ValueError
         For keys that do not give both, or give one twice.
     """
-    given = [key for key in SPEEDS if f"tow.{key}" in values]
+    radius, speed = _circle(values, gravity)
+    # What the one is computed from may be too large or too small for the other.
+    if not (0.0 < radius < inf and 0.0 < speed < inf):
+        raise ValueError(f"the keys of [tow] make a circle of {radius:g} m and a speed of {speed:g} m/s")
+    return radius, speed
+
+
+def _circle(values: Values, gravity: float) -> tuple[float, float]:
     if "tow.radius" in values:
         radius = values["tow.radius"]
         key = _one_of(values, "tow", SPEEDS, "the speed of the tow point")
@@ -73,8 +80,8 @@ def circle(values: Values, gravity: float) -> tuple[float, float]:
             return radius, values["tow.speed"]
         by_gravity = key in ("bank_angle", "gamma")
         return radius, _gamma(values) * sqrt(radius * gravity) if by_gravity else _rate(values, key) * radius
-    others = [key for key in given if key != "speed"]
-    if "speed" not in given or len(others) != 1:
+    others = [key for key in SPEEDS if key != "speed" and f"tow.{key}" in values]
+    if "tow.speed" not in values or len(others) != 1:
         listed = ", ".join(f"tow.{key}" for key in SPEEDS[1:])
         raise ValueError(
             "tow.radius is missing: the radius of the circle that the tow point moves on; tow.speed and one of "
@@ -82,7 +89,8 @@ def circle(values: Values, gravity: float) -> tuple[float, float]:
         )
     speed = values["tow.speed"]
     if others[0] in ("bank_angle", "gamma"):
-        return speed**2 / (gravity * _gamma(values) ** 2), speed
+        slowness = speed / _gamma(values)
+        return slowness * slowness / gravity, speed
     return speed / _rate(values, others[0]), speed
 
 
@@ -135,7 +143,7 @@ def cable_mass(values: Values, density: float, gravity: float) -> tuple[float, f
                 f"cable.{names[1]} is more than the weight of cable.{names[0]}: it is the same less buoyancy"
             )
         return mass, displaced
-    area = values.get("cable.displaced_area", 0.25 * pi * values.get("cable.diameter", nan) ** 2)
+    area = values.get("cable.displaced_area", _circle_area(values.get("cable.diameter", nan)))
     displaced = density * area if density else 0.0
     if weight is None:
         assert mass is not None
@@ -233,7 +241,7 @@ def fish_mass(values: Values, density: float, gravity: float) -> tuple[float, fl
     """
     mass, weight, volume = (values.get(f"fish.{key}") for key in ("mass", "submerged_weight", "volume"))
     if volume is None and "fish.diameter" in values and (mass is None or weight is None):
-        volume = pi * values["fish.diameter"] ** 3 / 6.0
+        volume = _circle_area(values["fish.diameter"]) * values["fish.diameter"] * 2.0 / 3.0
     if mass is None:
         if weight is None:
             raise ValueError("fish.mass is missing; without a fish leave out the section [fish]")
@@ -301,7 +309,7 @@ def fish_drag_area(values: Values) -> float:
     """
     coefficient, area = values.get("fish.drag_coefficient"), values.get("fish.frontal_area")
     if area is None and "fish.diameter" in values:
-        area = 0.25 * pi * values["fish.diameter"] ** 2
+        area = _circle_area(values["fish.diameter"])
     elif area is not None and coefficient is None:
         raise ValueError("fish.drag_coefficient is missing: the drag of the fish needs it beside fish.frontal_area")
     if not coefficient:
@@ -335,6 +343,11 @@ def left_out(values: Values, cable_type: str) -> dict[str, tuple[str, ...]]:
         # The diameter of a fish gives the area of its drag, too.
         "air": (*(key for key in dense if key != "fish.diameter"), *forces),
     }
+
+
+def _circle_area(diameter: float) -> float:
+    # Not a power, which raises where it overflows.
+    return 0.25 * pi * diameter * diameter
 
 
 def _one_of(values: Values, section: str, names: tuple[str, ...], what: str) -> str:

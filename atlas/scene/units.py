@@ -111,9 +111,7 @@ def parse_quantity(name: str, value: Any, unit: str, bare: str | None = None, tw
         raise ValueError(f"{name} = {short(value)} is not finite")
     if not isinstance(value, str):
         if unit == "rad":
-            raise ValueError(
-                f"{name} = {short(value)} has no unit, and degrees or radians? Write it as {_sample(unit)}"
-            )
+            raise ValueError(f"{name} = {short(value)}: degrees or radians? Write it as {_sample(unit)}")
         symbol = bare or unit
     if symbol == unit:
         return number
