@@ -71,10 +71,13 @@ def _run(options: argparse.Namespace) -> int:
             "complete": found.complete,
             "cables": rows,
             "reason": reason,
+            "notes": found.notes,
         }
         print_json(answer)
     elif rows:
         print(_text(found, rows))
+    for note in found.notes:
+        say(note)
     if not found.complete:
         say("not everywhere made out: cables may be missing")
     if reason:
@@ -99,7 +102,7 @@ def _row(found: Design, cable: Cable) -> dict[str, Any]:
         "r_f_m": cable.radius,
         "phase_deg": cable.phase_deg,
         "tension_N": cable.tension,
-        "jumps_looked_at": [scene.gamma * share for share in LOOKED],
+        "jumps_looked_at": [abs(scene.gamma) * share for share in LOOKED],
         "jumps_complete": cable.jumps.complete,
         "nearest_gamma": None,
         "distance_gamma": None,
@@ -110,11 +113,12 @@ def _row(found: Design, cable: Cable) -> dict[str, Any]:
     }
     at = cable.nearest(scene.gamma)
     if at >= 0:
-        distance = float(cable.jumps.gamma[at]) - scene.gamma
+        nearest, speed = abs(float(cable.jumps.gamma[at])), abs(scene.gamma)
+        distance = nearest - speed
         row |= {
-            "nearest_gamma": float(cable.jumps.gamma[at]),
+            "nearest_gamma": nearest,
             "distance_gamma": distance,
-            "distance_relative": distance / scene.gamma,
+            "distance_relative": distance / speed,
             "distance_m_s": float(scene.speed_of(distance)),
             "nearest_shapes_below": int(cable.jumps.shapes_below[at]),
             "nearest_shapes_above": int(cable.jumps.shapes_above[at]),

@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,9 @@ from towatlas.commands.common import OK, add_atlas, add_patience, print_json, re
 from towatlas.commands.common import speed as dimensionless_speed
 from towatlas.kernels import status
 from towatlas.scene.choice import Choice, percent
-from towatlas.scene.file import read_scene, shipped_scenes
+from towatlas.scene.file import read_scene, scene_of_text, shipped_scenes
 from towatlas.scene.jumps import LOOKED, NEAR, Jumps, SceneAnswer, answer_scene
+from towatlas.scene.library import LARGEST
 from towatlas.scene.models import QUESTIONS, check_questions
 from towatlas.scene.scene import KNOT, MODELS, Scene
 from towatlas.tables.atlas import Atlas, open_atlas
@@ -26,6 +28,8 @@ COLUMNS = {
     "tension_N": "tension",
     "R_x0_N": "R_x0",
 }
+# Groups that are shown where there is such a force; the last has no number where there is none.
+NO_FORCE = {"C_t": 0.0, "C_s": 0.0, "b_s": None}
 
 
 def add(commands: Any) -> None:
@@ -37,7 +41,7 @@ def add(commands: Any) -> None:
         "the least model whose answers are those of the larger ones within the scene's tolerance. "
         f"Scenes that come with the package, by name: {', '.join(shipped_scenes())}.",
     )
-    parser.add_argument("file", metavar="FILE", help="a scene; see docs/scenes.md")
+    parser.add_argument("file", metavar="FILE", help="a scene, - for one on standard input; see docs/scenes.md")
     add_speed(parser)
     parser.add_argument("--model", choices=MODELS, help="this one, compared with no other; default: the least")
     parser.add_argument(
@@ -91,7 +95,7 @@ def add_speed(parser: argparse.ArgumentParser) -> None:
 
 def scene_of(path: str, options: argparse.Namespace) -> Scene:
     """The scene at the speed asked for."""
-    scene = read_scene(path)
+    scene = scene_of_text(sys.stdin.buffer.read(LARGEST + 1), "-") if path == "-" else read_scene(path)
     given = {"speed": options.speed, "rotation_rate": options.rpm, "gamma": options.gamma}
     return scene if all(value is None for value in given.values()) else scene.at(**given)
 
@@ -106,15 +110,17 @@ def _run(options: argparse.Namespace) -> int:
     atlas = atlas_if_any(options.atlas)
     answer = answer_scene(scene, atlas, options.model, options.asked)
     print_json(_object(answer)) if options.json else print(text_of(answer))
+    for note in answer.notes:
+        say(note)
     for code in {int(code) for code in answer.jumps.status} - {status.OK}:
         say(f"a critical speed could not be had: {status.SENTENCES[code]}")
     return OK
 
 
 def speeds(scene: Scene, gamma: float) -> dict[str, float | None]:
-    """A speed in every unit."""
-    speed = scene.speed_of(gamma)
-    values = {"gamma": gamma, "speed_m_s": speed, "speed_kn": speed / KNOT, "rpm": scene.rpm_of(gamma)}
+    """A speed in every unit; gamma alone has the sign of the turn."""
+    speed = scene.speed_of(abs(gamma))
+    values = {"gamma": gamma, "speed_m_s": speed, "speed_kn": speed / KNOT, "rpm": scene.rpm_of(abs(gamma))}
     return {name: real(value) for name, value in values.items()}
 
 
@@ -122,9 +128,23 @@ def _groups(scene: Scene, model: str) -> dict[str, float | None]:
     return {name: real(value) for name, value in (asdict(scene.system(model)) | {"gamma": scene.gamma}).items()}
 
 
+def _cable(scene: Scene) -> dict[str, Any] | None:
+    """The type of cable, and how well its laws are known."""
+    if (known := scene.cable_type) is None:
+        return None
+    low, high = known.angles_deg or (None, None)
+    return {
+        "type": known.name,
+        "source": known.source,
+        "standard_deviations": known.deviations,
+        "measured_from_deg": low,
+        "measured_to_deg": high,
+    }
+
+
 def _jumps(scene: Scene, jumps: Jumps) -> list[dict[str, Any]]:
     words = status.FLAG_MEANINGS.split()
-    near = jumps.near(scene.gamma)
+    near = jumps.near(abs(scene.gamma))
     return [
         {
             "n": int(jumps.n[k]),
@@ -150,6 +170,10 @@ def _equilibria(answer: SceneAnswer) -> list[dict[str, Any]]:
         row["tension_N"] = float(found.tension[k] * force)
         row |= {f"{name}_N": float(getattr(found, name)[k] * force) for name in ("R_x0", "R_y0", "R_z0")}
         row["R_x0"] = float(found.R_x0[k])
+        angles = answer.angles[k]
+        row["angle_min_deg"] = None if angles is None else angles.lowest
+        row["angle_max_deg"] = None if angles is None else angles.highest
+        row["extrapolated"] = None if angles is None else angles.extrapolated
         rows.append(row)
     return rows
 
@@ -202,7 +226,10 @@ def _object(answer: SceneAnswer) -> dict[str, Any]:
     return {
         "title": scene.title,
         "file": scene.source,
+        "notes": answer.notes,
         "medium": scene.medium,
+        "turn": scene.turn,
+        "cable": _cable(scene),
         "model": choice.model,
         "model_forced": choice.forced,
         "model_reason": choice.reason,
@@ -241,9 +268,12 @@ def text_of(answer: SceneAnswer) -> str:
     """Everything about a scene, for people."""
     scene = answer.scene
     by_model = {model: _groups(scene, model) for model in MODELS}
-    lines = [scene.title or scene.source, describe_speed(scene), f"towed in {MEDIA[scene.medium]}", ""]
+    lines = [scene.title or scene.source, describe_speed(scene), f"towed in {MEDIA[scene.medium]}"]
+    lines += [*_cable_lines(scene), ""]
     lines.append(f"{'group':<8}" + "".join(f" {model:>12}" for model in MODELS))
     for name in by_model["vacuum"]:
+        if name in NO_FORCE and all(by_model[model][name] == NO_FORCE[name] for model in MODELS):
+            continue
         lines.append(f"{name:<8}" + "".join(f" {_cell(by_model[model][name]):>12}" for model in MODELS))
     lines += ["", *_model_lines(answer.choice), "", *_jump_lines(answer), ""]
     if answer.choice.model != "vacuum" and answer.folds is not None:
@@ -254,8 +284,22 @@ def text_of(answer: SceneAnswer) -> str:
     lines.append(f"{'branch':>8} {'nodes':>5} " + " ".join(f"{name:>13}" for name in COLUMNS.values()))
     for row in _equilibria(answer):
         cells = " ".join(f"{_cell(row[name], 8):>13}" for name in COLUMNS)
-        lines.append(f"{row['branch']:>8} {row['nodes']:>5} {cells}{'  expected' if row['expected'] else ''}")
+        marks = "".join(f"  {mark}" for mark in ("expected", "extrapolated") if row[mark])
+        lines.append(f"{row['branch']:>8} {row['nodes']:>5} {cells}{marks}")
     return "\n".join(lines)
+
+
+def _cable_lines(scene: Scene) -> list[str]:
+    """The type of cable, and how well its laws are known."""
+    if (known := scene.cable_type) is None:
+        return []
+    words = [f"cable {known.name}" + (f": {known.source}" if known.source else "")]
+    if known.deviations:
+        listed = ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in known.deviations.items())
+        words.append(f"standard deviations: {listed}")
+    if known.angles_deg is not None:
+        words.append("measured at {:.1f} to {:.1f} degrees to the stream".format(*known.angles_deg))
+    return ["; ".join(words)]
 
 
 def _model_lines(choice: Choice) -> list[str]:
@@ -279,7 +323,7 @@ def _fold_lines(answer: SceneAnswer) -> list[str]:
     """Jumps with drag."""
     scene, folds = answer.scene, answer.folds
     assert folds is not None
-    low, high = (_cell(scene.speed_of(scene.gamma * share), 4) for share in LOOKED)
+    low, high = (_cell(scene.speed_of(abs(scene.gamma) * share), 4) for share in LOOKED)
     rows = _folds(answer)
     lines = [f"jumps ({answer.choice.model} model) from {low} to {high} m/s{'' if rows else ': none'}"]
     if rows:

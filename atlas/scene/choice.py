@@ -222,7 +222,8 @@ def _nearest(folds: Folds, gamma: float, above: bool) -> tuple[float, int]:
     """The jump next to a speed, and a status: NOT_FOUND where there is none between the speeds looked at."""
     if not folds.complete:
         return nan, status.NOT_CONVERGED
-    beyond = folds.gamma[folds.gamma > gamma] if above else folds.gamma[folds.gamma <= gamma]
+    jumps = np.abs(folds.gamma)
+    beyond = jumps[jumps > abs(gamma)] if above else jumps[jumps <= abs(gamma)]
     if not len(beyond):
         return nan, status.NOT_FOUND
     return float(beyond.min() if above else beyond.max()), status.OK

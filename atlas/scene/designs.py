@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from towatlas.checks import check_one
 from towatlas.effort import TooMuchWork, check_patience
 from towatlas.results import Equilibria, Folds
+from towatlas.scene.angles import Angles, angles_along, extrapolation
 from towatlas.scene.choice import least_model
 from towatlas.scene.models import solvable_models, system_of
 from towatlas.scene.scene import MODELS, Scene, check_model, patient_with
@@ -58,6 +59,8 @@ class Cable:
         At the tow point [N], > 0.
     jumps : Folds
         Between LOOKED times the speed, dimensionless; where they come from is not found out.
+    angles : Angles or None
+        Between cable and stream; None where it is not said where the cable was measured.
     """
 
     length: float
@@ -70,6 +73,7 @@ class Cable:
     phase_deg: float
     tension: float
     jumps: Folds
+    angles: Angles | None
 
     @property
     def radius(self) -> float:
@@ -82,14 +86,14 @@ class Cable:
         Parameters
         ----------
         gamma : float
-            [-], > 0.
+            [-].
 
         Returns
         -------
         int
             -1 where there is none.
         """
-        return int(np.argmin(np.abs(self.jumps.gamma - gamma))) if len(self.jumps) else -1
+        return int(np.argmin(np.abs(np.abs(self.jumps.gamma) - abs(gamma)))) if len(self.jumps) else -1
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,8 @@ class Design:
         The model by which they are found, of MODELS.
     reason : str
         Why this one.
+    forced : bool
+        Whether it was named, or is all there is, and was compared with no other.
     longest : float
         Longest cable searched [m], > 0.
     cables : tuple of Cable
@@ -126,12 +132,25 @@ class Design:
     value: float
     model: str
     reason: str
+    forced: bool
     longest: float
     cables: tuple[Cable, ...]
     chosen: tuple[Cable, ...]
     least: float
     most: float
     complete: bool
+
+    @property
+    def notes(self) -> list[str]:
+        """What whoever asks should know: of the scene, what the model leaves out, where laws are extrapolated."""
+        notes = list(self.scene.notes)
+        # What larger models confirmed is known to do nothing.
+        if self.forced and self.scene.density and (keys := self.scene.left_out.get(self.model)):
+            notes.append(f"the {self.model} model leaves out {', '.join(keys)}")
+        for cable in self.chosen:
+            if cable.expected and (text := extrapolation(self.scene, cable.angles)):
+                return [*notes, text]
+        return notes
 
 
 def design(
@@ -206,7 +225,7 @@ def design(
     with patient_with(scene, f"--{quantity} {value:g} {unit}, --max-length {longest:g} m", longest / scene.radius):
         found = _by_least(scene, names, quantity, value, longest)
     chosen = [cable for cable in found.cables if cable.radius <= max_radius and cable.tension <= max_tension]
-    return replace(found, chosen=tuple(chosen))
+    return replace(found, chosen=tuple(chosen), forced=len(names) == 1)
 
 
 def _by_least(scene: Scene, names: Sequence[str], quantity: str, value: float, longest: float) -> Design:
@@ -276,6 +295,7 @@ def _by_model(scene: Scene, model: str, quantity: str, value: float, longest: fl
                 phase_deg=float(shapes.phase_deg[at]),
                 tension=float(shapes.tension[at]) * scene.force_unit(model),
                 jumps=folds_in_speed(system, gamma * LOOKED[0], gamma * LOOKED[1], named=False),
+                angles=angles_along(scene, shapes, at),
             )
         )
     return Design(
@@ -284,6 +304,7 @@ def _by_model(scene: Scene, model: str, quantity: str, value: float, longest: fl
         value=value,
         model=model,
         reason="",
+        forced=False,
         longest=longest,
         cables=tuple(cables),
         chosen=(),
@@ -310,7 +331,7 @@ def _lengths(
         return none, none, none, *_extremes(longest_system, scene.gamma, quantity), True
     system = replace(longest_system, lam=shortest)
     if system.in_vacuum and quantity == "depth":
-        exact = cables_to_depth(w_f=system.w_f, gamma=scene.gamma, z_f=target, lam_max=far)
+        exact = cables_to_depth(w_f=system.w_f, gamma=abs(scene.gamma), z_f=target, lam_max=far)
         least, most = (np.nan, np.nan) if len(exact) else _extremes(longest_system, scene.gamma, quantity)
         return exact.lam, np.full(len(exact), np.nan), np.abs(exact.x_f), least, most, True
     found = cables_for(system, scene.gamma, quantity, target, far)

@@ -10,6 +10,7 @@ from towatlas.effort import check_foreseen, check_patience
 from towatlas.kernels import status
 from towatlas.limits import transitions
 from towatlas.results import Equilibria, Folds
+from towatlas.scene.angles import Angles, angles_along, extrapolation
 from towatlas.scene.choice import Choice, least_model
 from towatlas.scene.models import QUESTIONS
 from towatlas.scene.scene import Scene, patient_with
@@ -116,12 +117,27 @@ class SceneAnswer:
         The model used and why, with its answers in SI.
     folds : Folds or None
         All jumps of the model used between the speeds looked at, dimensionless; None where none were asked for.
+    angles : list of Angles or None
+        Between cable and stream in each equilibrium; None where it is not said where the cable was measured.
     """
 
     scene: Scene
     jumps: Jumps
     choice: Choice
     folds: Folds | None
+    angles: list[Angles | None]
+
+    @property
+    def notes(self) -> list[str]:
+        """What whoever asks should know: of the scene, what no model looked at, where laws are extrapolated."""
+        notes = list(self.scene.notes)
+        largest = self.choice.answers[-1].model
+        # What a larger model confirmed is known to do nothing.
+        if self.scene.density and (keys := self.scene.left_out.get(largest)):
+            notes.append(f"the {largest} model leaves out {', '.join(keys)}")
+        if text := extrapolation(self.scene, self.angles[self.equilibria.expected]):
+            notes.append(text)
+        return notes
 
     @property
     def equilibria(self) -> Equilibria:
@@ -224,8 +240,15 @@ def answer_scene(
 
 def _answer(scene: Scene, atlas: Atlas | None, model: str | None, asked: Sequence[str]) -> SceneAnswer:
     groups, gamma = scene.system("vacuum"), scene.gamma
-    jumps = critical_speeds(lam=groups.lam, w_f=groups.w_f, gamma=gamma, atlas=atlas)
+    jumps = critical_speeds(lam=groups.lam, w_f=groups.w_f, gamma=abs(gamma), atlas=atlas)
     looked = (gamma * LOOKED[0], gamma * LOOKED[1])
     choice = least_model(scene, model, asked, looked)
     folds = choice.answer.folds
-    return SceneAnswer(scene=scene, jumps=jumps, choice=choice, folds=None if folds is None else name_folds(folds))
+    found = choice.answer.equilibria
+    return SceneAnswer(
+        scene=scene,
+        jumps=jumps,
+        choice=choice,
+        folds=None if folds is None else name_folds(folds),
+        angles=[angles_along(scene, found, k) for k in range(len(found))],
+    )

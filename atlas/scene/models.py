@@ -1,7 +1,7 @@
 """What the models of the report's Table 1 answer about a scene."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,8 +115,7 @@ def system_of(scene: Scene, model: str) -> System:
     ValueError
         If this model has no such cable, as one that nothing holds down or up.
     """
-    groups = scene.system(check_model(model))
-    return System.of(groups.lam, groups.w_f, C=groups.C, m_f=groups.m_f, C_f=groups.C_f, w=groups.w)
+    return System.of(**asdict(scene.system(check_model(model))))
 
 
 def solve_model(

@@ -3,18 +3,20 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from math import pi, sqrt
+from math import inf, pi, sqrt
 from typing import Any
 
-from towatlas.checks import check_one
+from towatlas.checks import check_finite, check_one
 from towatlas.effort import TooMuchWork, patience
+from towatlas.scene.derived import SPEEDS
+from towatlas.scene.library import CableType
 from towatlas.system import System
 
 KNOT = 1852.0 / 3600.0  # m/s
 # The models of the report's Table 1, in rising order of what they take into account.
 MODELS = ("vacuum", "air", "water")
 # Keys of a file that give the speed.
-SPEED_KEYS = ("tow.speed", "tow.rpm", "tow.rotation_rate", "tow.gamma")
+SPEED_KEYS = tuple(f"tow.{key}" for key in SPEEDS)
 
 
 @dataclass(frozen=True)
@@ -31,10 +33,18 @@ class Scene:
         Of the cable [m], > 0; nan if not given.
     mass_per_length : float
         Of the cable, in air [kg/m], > 0.
+    displaced_per_length : float
+        Mass of the fluid that the cable displaces, rho A [kg/m], >= 0.
     diameter : float
         Of the cable [m], > 0; nan if not given, as a vacuum allows.
     drag_coefficient : float
         Of the cable [-], >= 0; nan if not given, as a vacuum allows.
+    tangential_drag_coefficient : float
+        Of the cable, on its diameter [-], >= 0.
+    side_force_coefficient : float
+        Of a stranded cable, a of DTMB Report 713 [-], positive to starboard of the track.
+    side_force_sine : float
+        Of the angle between cable and stream at which that force is at its largest, b [-], > 0; inf for none.
     fish_mass : float
         In air [kg], >= 0.
     fish_displaced : float
@@ -47,12 +57,20 @@ class Scene:
         Of the circle of the tow point [m], > 0.
     speed : float
         Of the tow point [m/s], > 0.
+    turn : str
+        "starboard" or "port".
     density : float
         Of the fluid [kg/m^3], >= 0; 0 in a vacuum.
     gravity : float
         [m/s^2], > 0.
     tolerance : float
         Within which models agree, relative [-], > 0.
+    cable_type : CableType or None
+        Where keys of the cable are from.
+    notes : tuple of str
+        What whoever asks should know: keys that are missing or do nothing, values of unusual size.
+    left_out : dict of tuple of str
+        What is given and not used, by model.
     given : dict of str
         Length, radius and speed as the user wrote them, by "section.key"; empty by default.
     """
@@ -61,28 +79,31 @@ class Scene:
     source: str
     length: float
     mass_per_length: float
+    displaced_per_length: float
     diameter: float
     drag_coefficient: float
+    tangential_drag_coefficient: float
+    side_force_coefficient: float
+    side_force_sine: float
     fish_mass: float
     fish_displaced: float
     fish_added_mass: float
     fish_drag_area: float
     radius: float
     speed: float
+    turn: str
     density: float
     gravity: float
     tolerance: float
+    cable_type: CableType | None = None
+    notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    left_out: dict[str, tuple[str, ...]] = field(default_factory=dict, compare=False, repr=False)
     given: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def gamma(self) -> float:
-        """Dimensionless speed Omega sqrt(R/g), Eq. (13b) [-]."""
-        return self.speed / sqrt(self.radius * self.gravity)
-
-    @property
-    def displaced_per_length(self) -> float:
-        """Mass of the fluid that the cable displaces, rho A [kg/m]."""
-        return self.density * 0.25 * pi * self.diameter**2 if self.density else 0.0
+        """Dimensionless speed Omega sqrt(R/g), Eq. (13b) [-], negative in a turn to port."""
+        return self.speed / sqrt(self.radius * self.gravity) * (-1.0 if self.turn == "port" else 1.0)
 
     @property
     def medium(self) -> str:
@@ -134,7 +155,8 @@ class Scene:
         Parameters
         ----------
         model : str
-            "vacuum": as if there were no fluid. "air": drag, but neither buoyancy nor apparent mass. "water": all.
+            "vacuum": as if there were no fluid. "air": normal drag and that of the fish. "water": all, with buoyancy,
+            apparent mass, tangential drag and side force.
 
         Returns
         -------
@@ -148,7 +170,7 @@ class Scene:
 
         References
         ----------
-        NRL Report 7048, Eqs. (13), (16), (17), Table 1.
+        NRL Report 7048, Eqs. (13), (16), (17), Table 1; the side force: DTMB Report 713.
         """
         unit = self.mass_unit(model)
         heavy = model == "water"
@@ -156,13 +178,18 @@ class Scene:
         displaced = self.displaced_per_length if heavy else 0.0
         fish_displaced = self.fish_displaced if heavy and self.density else 0.0
         added = self.fish_added_mass if heavy and self.density else 0.0
+        cable_drag = drag * self.diameter * self.radius / unit if drag else 0.0
+        along, side = (self.tangential_drag_coefficient, self.side_force_coefficient) if heavy else (0.0, 0.0)
         return System(
             lam=self.length / self.radius,
             w_f=(self.fish_mass - fish_displaced) / (unit * self.radius),
             m_f=(self.fish_mass + added) / (unit * self.radius),
-            C=drag * self.drag_coefficient * self.diameter * self.radius / unit if drag else 0.0,
+            C=cable_drag * self.drag_coefficient if drag else 0.0,
             C_f=drag * self.fish_drag_area / unit,
             w=(self.mass_per_length - displaced) / unit,
+            C_t=cable_drag * along,
+            C_s=cable_drag * side,
+            b_s=self.side_force_sine if side else inf,
         )
 
     def speed_of(self, gamma: Any) -> Any:
@@ -198,7 +225,7 @@ class Scene:
     def at(
         self, *, speed: float | None = None, rotation_rate: float | None = None, gamma: float | None = None
     ) -> "Scene":
-        """The same scene at another speed; exactly one of these.
+        """The same circle and turn at another speed; exactly one of these.
 
         Parameters
         ----------
@@ -207,7 +234,7 @@ class Scene:
         rotation_rate : float, optional
             [rad/s].
         gamma : float, optional
-            Omega sqrt(R/g) [-].
+            Omega sqrt(R/g) [-], positive; in a turn to port negative, too.
 
         Returns
         -------
@@ -218,6 +245,8 @@ class Scene:
         ValueError
             For none of them, or several.
         """
+        if gamma is not None and self.turn == "port":
+            gamma = abs(check_finite("gamma", gamma))
         given = {"speed": speed, "rotation_rate": rotation_rate, "gamma": gamma}
         checked = {name: check_one(name, value) for name, value in given.items() if value is not None}
         if len(checked) != 1:

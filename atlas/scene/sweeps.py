@@ -118,7 +118,7 @@ def _curve(scene: Scene, name: str, values: Array, model: str | None) -> tuple[s
         system = system_of(scenes[0], model)
         if name == "length":
             return model, sweep_shapes(system, scene.gamma, "lam", values / scene.radius)
-        return model, sweep_shapes(system, scenes[0].gamma, "gamma", values * (scenes[0].gamma / scenes[0].speed))
+        return model, sweep_shapes(system, scenes[0].gamma, "gamma", values * abs(scenes[0].gamma / scenes[0].speed))
 
 
 def _at(scene: Scene, name: str, value: float) -> Scene:

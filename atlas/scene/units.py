@@ -19,6 +19,15 @@ _EXPONENT = 400
 _NAME = r"[^\W\d]\w*+|[%°'\"]"
 _POWER = r"(?:\s*+(?:\^|\*\*)\s*+[+-]?\d(?:\.\d)?(?![\d.]))?"
 _UNIT = re.compile(rf"(?:(?:[*/·()\s]|1\s*+/|{_NAME}){_POWER})*+")
+# What people write and pint does not read: a power without its sign, "kg/m3", and "lb/1000 ft".
+_BARE_POWER = re.compile(r"(?<=[^\W\d_])([23])(?!\w)")
+_PER_MANY = re.compile(r"/\s*(10{1,6})\s*(?=[^\W\d])")
+_ALIASES = ("kilogram = Kg", "pound = lbm", "revolutions_per_minute = RPM = Rpm")
+# Names that mean two things, one of which pint would take without asking.
+_AMBIGUOUS = {
+    "nm": "a nanometre or a nautical mile: write nanometer or nmi",
+    "gr": "a grain or a gram: write grain or g",
+}
 # What a number with units may be for; the message names it. Angles are told from pure numbers, see `_same`.
 _KINDS = {
     "m": "a length",
@@ -27,6 +36,8 @@ _KINDS = {
     "m/s": "a speed",
     "m/s^2": "an acceleration",
     "rad/s": "a rate of rotation",
+    "rad": "an angle",
+    "s": "a time",
     "kg": "a mass",
     "kg/m": "a mass per length",
     "kg/m^3": "a density",
@@ -43,6 +54,8 @@ def _registry() -> Any:
 
     registry: Any = pint.UnitRegistry()
     registry.define("rev = revolution")
+    for names in _ALIASES:
+        registry.define(f"@alias {names}")
     return registry
 
 
@@ -51,7 +64,7 @@ def _same(one: Any, other: Any) -> bool:
     return one.to_root_units().units == other.to_root_units().units
 
 
-def parse_quantity(name: str, value: Any, unit: str, bare: str | None = None) -> float:
+def parse_quantity(name: str, value: Any, unit: str, bare: str | None = None, twin: str | None = None) -> float:
     """A quantity in SI.
 
     Parameters
@@ -61,9 +74,12 @@ def parse_quantity(name: str, value: Any, unit: str, bare: str | None = None) ->
     value : float or str
         A number in SI, or text with a unit: decimal, fraction ("11/16 in") or mixed ("1 1/2 in").
     unit : str
-        The SI unit wanted, one of m, m^2, m^3, m/s, m/s^2, rad/s, kg, kg/m, kg/m^3, N, N/m, and "" for a pure number.
+        The SI unit wanted, one of m, m^2, m^3, m/s, m/s^2, rad/s, rad, s, kg, kg/m, kg/m^3, N, N/m, and "" for a pure
+        number. An angle needs its unit written.
     bare : str, optional
         The unit of a number without one, if not SI.
+    twin : str, optional
+        Of a mass the name of the weight that goes with it, of a weight that of the mass.
 
     Returns
     -------
@@ -73,7 +89,7 @@ def parse_quantity(name: str, value: Any, unit: str, bare: str | None = None) ->
     Raises
     ------
     ValueError
-        If it is no number, not finite, or its unit is unknown or of another kind; the message names the key.
+        If it is no number, not finite, or its unit is unknown, ambiguous or of another kind; the message names the key.
 
     Examples
     --------
@@ -94,10 +110,12 @@ def parse_quantity(name: str, value: Any, unit: str, bare: str | None = None) ->
     if not math.isfinite(number):
         raise ValueError(f"{name} = {short(value)} is not finite")
     if not isinstance(value, str):
+        if unit == "rad":
+            raise ValueError(f"{name} = {short(value)}: degrees or radians? Write it as {_sample(unit)}")
         symbol = bare or unit
     if symbol == unit:
         return number
-    return _convert(name, value, number, symbol, unit)
+    return _convert(name, value, number, symbol, unit, twin)
 
 
 def _split(name: str, text: str, unit: str) -> tuple[float, str]:
@@ -125,9 +143,16 @@ def _decimal(text: str) -> Fraction:
     return Fraction(text) if exponent >= -_EXPONENT else Fraction(0)
 
 
-def _convert(name: str, value: Any, number: float, symbol: str, unit: str) -> float:
+def _convert(name: str, value: Any, number: float, symbol: str, unit: str, twin: str | None) -> float:
     registry = _registry()
     wanted = registry.Quantity(1.0, unit)
+    for word in re.findall(r"[^\W\d_]+", symbol):
+        if word in _AMBIGUOUS:
+            raise ValueError(f"{name} = {short(value)}: {word} may be {_AMBIGUOUS[word]}")
+    many = _PER_MANY.search(symbol)
+    if many is not None:
+        number, symbol = number / int(many[1]), f"{symbol[: many.start()]}/{symbol[many.end() :]}"
+    symbol = _BARE_POWER.sub(r"^\1", symbol)
     try:
         if _UNIT.fullmatch(symbol) is None:
             raise ValueError
@@ -136,20 +161,25 @@ def _convert(name: str, value: Any, number: float, symbol: str, unit: str) -> fl
     except Exception:  # pint raises whatever its parser meets, and what powers of prefixes overflow
         raise ValueError(f"{name} = {short(value)}: unit {symbol!r} is unknown; write it as {_sample(unit)}") from None
     if not given._is_multiplicative or not same:
-        raise ValueError(f"{name} = {short(value)} is not {_KINDS[unit]}{_hint(symbol, given, unit)}")
+        raise ValueError(f"{name} = {short(value)} is not {_KINDS[unit]}{_hint(symbol, given, unit, twin)}")
     converted = float((number * given).to(wanted.units).magnitude)
     if not math.isfinite(converted):
         raise ValueError(f"{name} = {short(value)} is not finite")
     return converted
 
 
-def _hint(symbol: str, given: Any, unit: str) -> str:
+def _hint(symbol: str, given: Any, unit: str, twin: str | None) -> str:
     if symbol == "":
-        return f": it has no unit; write {_sample(unit)}, or the number alone, without quotes, for SI"
+        bare = "" if unit == "rad" else ", or the number alone, without quotes, for SI"
+        return f": it has no unit; write {_sample(unit)}{bare}"
     if unit == "rad/s" and given.check("1/[time]"):
         return f": it is not clear whether {symbol!r} counts turns or radians; write rpm, rev/s or rad/s"
     if unit in ("N", "N/m") and given.check("[mass]" if unit == "N" else "[mass]/[length]"):
-        return f" but a mass; write {'kgf or lbf' if unit == 'N' else 'kgf/m or lbf/ft'} for the weight of a mass"
+        kinds = f" but a mass; write {'kgf or lbf' if unit == 'N' else 'kgf/m or lbf/ft'} for the weight of a mass"
+        return kinds + (f", or give the mass in air as {twin}" if twin else "")
+    if unit in ("kg", "kg/m") and given.check("[force]" if unit == "kg" else "[force]/[length]"):
+        kinds = f" but a weight; write {'kg or lb' if unit == 'kg' else 'kg/m or lb/ft'} for the mass"
+        return kinds + (f", or give the weight in the fluid as {twin}" if twin else "")
     return f"; write it as {_sample(unit)}"
 
 
@@ -161,6 +191,8 @@ def _sample(unit: str) -> str:
         "m/s": '"3 kn"',
         "m/s^2": '"9.81 m/s^2"',
         "rad/s": '"40 rpm"',
+        "rad": '"30 deg"',
+        "s": '"2 min"',
         "kg": '"14.1 g"',
         "kg/m": '"0.18 g/ft"',
         "kg/m^3": '"1025 kg/m^3"',
