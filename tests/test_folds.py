@@ -207,6 +207,26 @@ def test_shell(capsys):
         assert run(capsys, "folds", "--lam", 6, "--wf", 0.1, "--gamma", bad)[0] == 2
 
 
+def test_a_scene_ends_with_its_margin(capsys, tmp_path):
+    """What applies first, the nearest jumps last; the other models only where they are asked for."""
+    lines = []
+    for section, keys in DEEP.items():
+        lines += [f"[{section}]", *(f"{key} = {json.dumps(value)}" for key, value in keys.items())]
+    text = "\n".join(lines)
+    (tmp_path / "deep.toml").write_text(text)
+    code, out, _ = run(capsys, "scene", tmp_path / "deep.toml")
+    assert code == 0
+    assert out.splitlines()[-1] == (
+        "nearest jumps (water model): 2.5292 m/s, 4.9165 kn below (-1.7 %); 2.6272 m/s, 5.1069 kn above (+2.1 %)"
+    )
+    assert out.index("equilibria (water model)") < out.index("jumps (water model)") < out.index("group ")
+    assert "vacuum model)" not in out
+    compared = run(capsys, "scene", tmp_path / "deep.toml", "--compare")[1]
+    assert "(vacuum model)" in compared
+    assert "disagrees" in compared
+    assert "none below down to 0.0" in run(capsys, "scene", "skop-fig3", "--gamma", 0.1)[1]
+
+
 def test_jumps_are_null_where_none_were_looked_for(capsys):
     arguments = ("scene", "skop-fig3", "--model", "air", "--json", "--asked")
     answer = json.loads(run(capsys, *arguments, "nodes")[1])

@@ -62,7 +62,7 @@ def test_a_fold_that_drag_takes_away():
     assert answer.equilibria is answer.choice.answer.equilibria
     assert answer.equilibria.system.C == scene.system("air").C
     assert answer_scene(scene, asked=HANGS).choice.model == "vacuum"
-    text = text_of(answer)
+    text = text_of(answer, compare=True)
     lines = text.splitlines()
     assert sum(line.startswith("vacuum  air ") and line.endswith("disagrees") for line in lines) == 1
     (row,) = (line for line in lines if line.endswith("vacuum, n = 1"))

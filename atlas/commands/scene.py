@@ -3,9 +3,12 @@
 import argparse
 import math
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from towatlas.commands.common import OK, add_atlas, add_patience, print_json, real, say
 from towatlas.commands.common import speed as dimensionless_speed
@@ -51,8 +54,11 @@ def add(commands: Any) -> None:
         metavar="WHAT,...",
         help=f"what the model has to answer, some of {', '.join(QUESTIONS)}; default all",
     )
+    parser.add_argument(
+        "--compare", action="store_true", help="also groups and critical speeds by the other models, and the comparison"
+    )
     add_atlas(parser)
-    parser.add_argument("--json", action="store_true", help="one object instead of tables")
+    parser.add_argument("--json", action="store_true", help="one object instead of tables, with all of it")
     add_patience(parser)
     parser.set_defaults(run=_run)
 
@@ -109,7 +115,7 @@ def _run(options: argparse.Namespace) -> int:
     scene = scene_of(options.file, options)
     atlas = atlas_if_any(options.atlas)
     answer = answer_scene(scene, atlas, options.model, options.asked)
-    print_json(_object(answer)) if options.json else print(text_of(answer))
+    print_json(_object(answer)) if options.json else print(text_of(answer, options.compare))
     for note in answer.notes:
         say(note)
     for code in {int(code) for code in answer.jumps.status} - {status.OK}:
@@ -264,29 +270,59 @@ def describe_speed(scene: Scene) -> str:
     )
 
 
-def text_of(answer: SceneAnswer) -> str:
-    """Everything about a scene, for people."""
-    scene = answer.scene
-    by_model = {model: _groups(scene, model) for model in MODELS}
+def text_of(answer: SceneAnswer, compare: bool = False) -> str:
+    """Everything about a scene, for people; what applies first, what other models say only to compare."""
+    scene, choice = answer.scene, answer.choice
     lines = [scene.title or scene.source, describe_speed(scene), f"towed in {MEDIA[scene.medium]}"]
-    lines += [*_cable_lines(scene), ""]
-    lines.append(f"{'group':<8}" + "".join(f" {model:>12}" for model in MODELS))
-    for name in by_model["vacuum"]:
-        if name in NO_FORCE and all(by_model[model][name] == NO_FORCE[name] for model in MODELS):
-            continue
-        lines.append(f"{name:<8}" + "".join(f" {_cell(by_model[model][name]):>12}" for model in MODELS))
-    lines += ["", *_model_lines(answer.choice), "", *_jump_lines(answer), ""]
-    if answer.choice.model != "vacuum" and answer.folds is not None:
-        lines += [*_fold_lines(answer), ""]
-    lines.append(
-        f"equilibria ({answer.choice.model} model), the fish in m, forces in N, its phase behind the tow point"
-    )
+    lines += [*_cable_lines(scene), f"{choice.model} model: {choice.reason}", ""]
+    lines.append(f"equilibria ({choice.model} model), the fish in m, forces in N, its phase behind the tow point")
     lines.append(f"{'branch':>8} {'nodes':>5} " + " ".join(f"{name:>13}" for name in COLUMNS.values()))
     for row in _equilibria(answer):
         cells = " ".join(f"{_cell(row[name], 8):>13}" for name in COLUMNS)
         marks = "".join(f"  {mark}" for mark in ("expected", "extrapolated") if row[mark])
         lines.append(f"{row['branch']:>8} {row['nodes']:>5} {cells}{marks}")
+    lines.append("")
+    if choice.model != "vacuum" and answer.folds is not None:
+        lines += [*_fold_lines(answer), ""]
+    if choice.model == "vacuum" or compare:
+        lines += [*_jump_lines(answer), ""]
+    lines += _group_lines(scene, MODELS if compare else (choice.model,))
+    if compare and choice.differences:
+        lines += ["", *_difference_lines(choice)]
+    if answer.folds is not None:
+        lines += ["", _margin(answer)]
     return "\n".join(lines)
+
+
+def _margin(answer: SceneAnswer) -> str:
+    """How far the speed is from the jumps beside it."""
+    scene, folds = answer.scene, answer.folds
+    assert folds is not None
+    here, speeds_of = abs(scene.gamma), np.abs(folds.gamma)
+    words = []
+    for side, beside in (("below", speeds_of[speeds_of <= here]), ("above", speeds_of[speeds_of > here])):
+        if not len(beside):
+            words.append(f"none {side} down to" if side == "below" else f"none {side} up to")
+            words[-1] += f" {_cell(scene.speed_of(here * LOOKED[side == 'above']), 4)} m/s"
+            continue
+        nearest = float(beside.max() if side == "below" else beside.min())
+        speed = scene.speed_of(nearest)
+        words.append(
+            f"{_cell(speed, 5)} m/s, {_cell(speed / KNOT, 5)} kn {side} ({100.0 * (nearest / here - 1.0):+.2g} %)"
+        )
+    known = "" if folds.complete else "; not everywhere made out: others may lie between"
+    return f"nearest jumps ({answer.choice.model} model): {'; '.join(words)}{known}"
+
+
+def _group_lines(scene: Scene, models: Sequence[str]) -> list[str]:
+    """Dimensionless groups by some models."""
+    by_model = {model: _groups(scene, model) for model in models}
+    lines = [f"{'group':<8}" + "".join(f" {model:>12}" for model in models)]
+    for name in by_model[models[0]]:
+        if name in NO_FORCE and all(by_model[model][name] == NO_FORCE[name] for model in models):
+            continue
+        lines.append(f"{name:<8}" + "".join(f" {_cell(by_model[model][name]):>12}" for model in models))
+    return lines
 
 
 def _cable_lines(scene: Scene) -> list[str]:
@@ -302,13 +338,9 @@ def _cable_lines(scene: Scene) -> list[str]:
     return ["; ".join(words)]
 
 
-def _model_lines(choice: Choice) -> list[str]:
-    """The model used, why, and the comparison."""
-    lines = [f"{choice.model} model: {choice.reason}"]
-    if choice.differences:
-        lines.append(
-            f"{'model':<7} {'against':<7} {'in':<22} {'by it':>10} {'by larger':>10} {'unit':<4} {'differ':>8}"
-        )
+def _difference_lines(choice: Choice) -> list[str]:
+    """The comparison of the models."""
+    lines = [f"{'model':<7} {'against':<7} {'in':<22} {'by it':>10} {'by larger':>10} {'unit':<4} {'differ':>8}"]
     for d in choice.differences:
         by_it, by_larger = d.values("{:.5g}")
         apart = percent(d.relative) if math.isfinite(d.relative) else "-"
