@@ -106,12 +106,12 @@ def test_every_package_is_listed():
 
 @pytest.mark.network
 def test_the_wheel_holds_what_the_repository_does(wheel):
-    """Every module, and the scenes."""
+    """Every module, the scenes, and the types of cable."""
     inside = set(zipfile.ZipFile(wheel).namelist())
     expected = set()
     for package in SETUPTOOLS["packages"]:
         folder = ROOT / folder_of(package)
-        files = [*folder.glob("*.py"), *folder.glob("scenes/*.toml")]
+        files = [path for kind in ("*.py", "*.toml", "scenes/*.toml") for path in folder.glob(kind)]
         expected |= {"/".join([*package.split("."), *path.relative_to(folder).parts]) for path in files}
     assert any(name.endswith(".toml") for name in expected)
     assert expected == {name for name in inside if ".dist-info/" not in name}
