@@ -145,8 +145,11 @@ def _encoding(dataset: xr.Dataset) -> dict[str, dict[str, Any]]:
     encoding: dict[str, dict[str, Any]] = {}
     for name, array in dataset.variables.items():
         # A fill value on a coordinate is a CF error, and xarray writes one unless told not to.
-        plain = name in dataset.coords or array.dtype.kind != "f"
-        encoding[str(name)] = {"_FillValue": None if plain else np.nan} | (COMPRESSION if array.ndim else {})
+        kind = array.dtype.kind
+        plain = name in dataset.coords or kind != "f"
+        # Older HDF5 fails on compressed texts of any length.
+        compressed = array.ndim and kind not in "OUS"
+        encoding[str(name)] = {"_FillValue": None if plain else np.nan} | (COMPRESSION if compressed else {})
     return encoding
 
 
