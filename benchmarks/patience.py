@@ -323,11 +323,11 @@ def run_all(some: list[Case], limit: float) -> Iterator[Run]:
 
 
 def write(runs: list[Run], path: Path) -> None:
-    """A row a command; the same bytes for the same rows."""
+    """A row a command, in the order of their numbers; the same bytes for the same rows."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow([field.name for field in fields(Run)])
-    table.writerows(astuple(run) for run in runs)
+    table.writerows(astuple(run) for run in sorted(runs, key=lambda run: run.number))
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(gzip.compress(text.getvalue().encode(), mtime=0))
 
@@ -362,7 +362,7 @@ def summary(runs: list[Run]) -> str:
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=5000)
-    parser.add_argument("--first", type=int, default=0, help="go on from this number; rows before it are kept")
+    parser.add_argument("--resume", action="store_true", help="keep the rows that --out has, and run the others")
     parser.add_argument("--seed", type=int, default=2026)
     parser.add_argument("--media", nargs="+", choices=MEDIA, default=MEDIA)
     parser.add_argument("--patience", type=float, default=SECONDS, help="of each command, s")
@@ -374,9 +374,10 @@ def main(arguments: list[str] | None = None) -> int:
     if options.work:
         work(options.work, limit)
         return 0
-    runs = read(options.out)[: options.first]
-    some = cases(options.count, options.seed, options.media, options.patience)[len(runs) :]
-    for run in run_all(some, limit):
+    runs = read(options.out) if options.resume else []
+    done = {run.number for run in runs}
+    every = cases(options.count, options.seed, options.media, options.patience)
+    for run in run_all([case for case in every if case.number not in done], limit):
         runs.append(run)
         if len(runs) % 100 == 0:
             write(runs, options.out)
