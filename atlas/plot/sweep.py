@@ -16,7 +16,8 @@ PANELS = (
     ("phase_deg", "phase (degrees)"),
 )
 COLOURS = ("#1f4e9c", "#c2571a", "#2a7f4f", "#7a3e9d", "#a61e3c", "#4d4d4d")
-WIDE = 10.0
+# Ranges of what is swept, and of what is drawn, beyond which the scale is logarithmic.
+WIDE, FAR = 10.0, 100.0
 
 
 def plot_sweep(found: "xarray.Dataset", name: str, axes: Any) -> list[Line2D]:
@@ -59,8 +60,11 @@ def plot_sweep(found: "xarray.Dataset", name: str, axes: Any) -> list[Line2D]:
         panel.grid(color="0.9", linewidth=0.6)
         if values[-1] > WIDE * values[0]:
             panel.set_xscale("log")
+        known = found[field].values[np.isfinite(found[field].values)]
         if field == "depth":
             panel.invert_yaxis()
+        elif field != "phase_deg" and known.min() > 0.0 and known.max() > FAR * known.min():
+            panel.set_yscale("log")
         if panel is not panels[-1]:
             panel.tick_params(labelbottom=False)
     panels[-1].set_xlabel(f"{name} ({unit})")
