@@ -269,6 +269,10 @@ class FishPositions:
     interpolated: NDArray[np.bool_]
 
 
+# What becomes of a pair of shapes as the speed rises, in the names of DragFolds.
+SIDES = ("appears", "ends", "again")
+
+
 @dataclass(frozen=True)
 class DragFolds:
     """Folds of towed cables in a nondense fluid; arrays of one shape, that of what was asked.

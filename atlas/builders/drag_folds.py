@@ -19,10 +19,11 @@ from towatlas.cf import symbol_attributes
 from towatlas.effort import patience
 from towatlas.nomenclature import DRAG
 from towatlas.numerics.errormap import SAFETY
+from towatlas.results import SIDES
 from towatlas.solve.folds import folds_in_speed, name_folds
 from towatlas.system import System
 from towatlas.tables.drag_folds import DRAG_GROUP
-from towatlas.tables.drag_series import AXES, ERRORS, FIELDS, FIELDS_BY_SPEED, OVERLAP, SIDES, W_SHARE, DragSeries
+from towatlas.tables.drag_series import AXES, ERRORS, FIELDS, FIELDS_BY_SPEED, OVERLAP, W_SHARE, DragSeries
 from towatlas.tables.seal import check_writable
 
 Array = NDArray[np.float64]

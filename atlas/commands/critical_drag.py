@@ -10,11 +10,10 @@ from towatlas.commands.folds import print_folds, row_of
 from towatlas.effort import TooMuchWork
 from towatlas.kernels import status
 from towatlas.limits import transitions
-from towatlas.results import DragFolds
+from towatlas.results import SIDES, DragFolds
 from towatlas.solve.drag_folds import solve_drag_folds
 from towatlas.solve.folds import folds
 from towatlas.tables.atlas import open_atlas
-from towatlas.tables.drag_series import SIDES
 
 # Transitions that are answered when none is named.
 MOST = 3

@@ -72,36 +72,6 @@ class Jumps:
         """
         return np.abs(self.gamma / gamma - 1.0) <= NEAR
 
-    def nearest(self, gamma: float) -> int:
-        """Row of the one nearest to a speed.
-
-        Parameters
-        ----------
-        gamma : float
-            [-], > 0.
-
-        Returns
-        -------
-        int
-            -1 where there is none.
-        """
-        known = np.isfinite(self.gamma)
-        return int(np.argmin(np.where(known, np.abs(self.gamma - gamma), np.inf))) if known.any() else -1
-
-    def passed(self, gamma: float) -> int:
-        """How many lie below a speed.
-
-        Parameters
-        ----------
-        gamma : float
-            [-], > 0.
-
-        Returns
-        -------
-        int
-        """
-        return int(np.sum(self.gamma < gamma))
-
 
 @dataclass(frozen=True)
 class SceneAnswer:

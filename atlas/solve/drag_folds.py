@@ -21,7 +21,7 @@ from towatlas.limits import unchecked_excess_length
 from towatlas.numerics.curves import Curve, Steps, follow
 from towatlas.numerics.hermite import cubic
 from towatlas.numerics.rows import EPS, newton
-from towatlas.results import DragFolds
+from towatlas.results import SIDES, DragFolds
 from towatlas.solve.critical import solve_rows
 from towatlas.solve.cusps import cusp_equations, cusp_errors
 from towatlas.solve.folds import folds_in_speed
@@ -47,7 +47,6 @@ ROUNDINGS = 64.0
 SETTLED = 1e-11
 # Points between two of a curve at which its cubic is looked at.
 FINE = 64
-SIDES = ("appears", "ends", "again")
 # Distances in log gamma of the speeds between which the least drag is found, one after the other.
 LEAST_SPREAD = (0.05, 0.02, 0.005)
 

@@ -27,7 +27,6 @@ FIELDS_BY_SPEED = ("C_by_speed", "r_f_by_speed")
 SERIES = tuple(f"{name}_series" for name in (*FIELDS, "C_cusp", *FIELDS_BY_SPEED))
 ERRORS = ("gamma_error", "C_cusp_error", "C_by_speed_error")
 AXES = ("lam_min", "lam_max", "w_f_max", "sigma_min", "gamma_max")
-SIDES = ("appears", "ends", "again")
 # Numbers of the table's answers, and their statuses.
 NUMBERS = (
     "appears",
