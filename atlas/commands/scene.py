@@ -58,7 +58,15 @@ def add(commands: Any) -> None:
         "--compare", action="store_true", help="also groups and critical speeds by the other models, and the comparison"
     )
     add_atlas(parser)
-    parser.add_argument("--json", action="store_true", help="one object instead of tables, with all of it")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--json", action="store_true", help="one object instead of tables, with all of it")
+    where.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="instead of tables FILE.svg, .png or .pdf, all shapes from the side and from above and the jumps; "
+        "or .csv, the shapes in SI, a row a point",
+    )
     add_patience(parser)
     parser.set_defaults(run=_run)
 
@@ -91,12 +99,12 @@ def quantity(unit: str, bare: str | None = None) -> Any:
     return positive
 
 
-def add_speed(parser: argparse.ArgumentParser) -> None:
-    """Arguments that put another speed in place of the scene's."""
+def add_speed(parser: argparse.ArgumentParser, rate: Any = dimensionless_speed) -> None:
+    """Arguments that put another speed in place of the scene's; `rate` is the type of a dimensionless one."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument("--speed", type=quantity("m/s"), metavar="V", help="of the tow point, as 3kn; bare: m/s")
     group.add_argument("--rpm", type=quantity("rad/s", "rpm"), metavar="N", help="turns a minute")
-    group.add_argument("--gamma", type=dimensionless_speed, metavar="GAMMA", help="Omega sqrt(R/g)")
+    group.add_argument("--gamma", type=rate, metavar="GAMMA", help="Omega sqrt(R/g)")
 
 
 def scene_of(path: str, options: argparse.Namespace) -> Scene:
@@ -112,10 +120,17 @@ def atlas_if_any(path: Path) -> Atlas | None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from towatlas.commands.scene_files import check_out, write_scene
+
+    if options.out:
+        check_out(options.out)
     scene = scene_of(options.file, options)
     atlas = atlas_if_any(options.atlas)
     answer = answer_scene(scene, atlas, options.model, options.asked)
-    print_json(_object(answer)) if options.json else print(text_of(answer, options.compare))
+    if options.out:
+        write_scene(answer, options.out)
+    else:
+        print_json(_object(answer)) if options.json else print(text_of(answer, options.compare))
     for note in answer.notes:
         say(note)
     for code in {int(code) for code in answer.jumps.status} - {status.OK}:
