@@ -12,9 +12,9 @@ from matplotlib.artist import Artist
 from matplotlib.lines import Line2D
 
 import towatlas
-from towatlas.report.figures import DRAWN_SEGMENTS, FIG_16, WINDOWS, Cable, coarse_gap, root_names
-from towatlas.report.page import FIGURES, MODELS, PHOTOGRAPHS, expected_nodes, report_page
-from towatlas.report.published import PUBLISHED, compare
+from towatlas.report.nrl7048.figures import DRAWN_SEGMENTS, FIG_16, WINDOWS, Cable, coarse_gap, root_names
+from towatlas.report.nrl7048.page import FIGURES, MODELS, PHOTOGRAPHS, expected_nodes, report_page
+from towatlas.report.nrl7048.published import PUBLISHED, compare
 
 # Of a page that takes a dozen seconds.
 pytestmark = pytest.mark.slow
