@@ -1,9 +1,11 @@
 """Scenes in files: shapes in SI against the keys of the scene, figures in which nothing covers a label, pages."""
 
 import csv
+import html.parser
 import io
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -178,7 +180,7 @@ def test_the_model_is_that_of_the_scene(capsys, monkeypatch):
         (("shape", "skop-fig3", "--model", "vacuum", "--s", 0.7), 2, "from 0 to 0.6604 m, the length of the cable"),
         (("shape", "skop-fig3", "--model", "vacuum", "--root", "shape 1"), 2, "one of the branches"),
         (("shape", "skop-fig3", "--out", "shape.html"), 2, "one of .nc, .csv, .svg, .png, .pdf"),
-        (("scene", "skop-fig3", "--out", "scene.xls"), 2, "one of .svg, .png, .pdf, .csv"),
+        (("scene", "skop-fig3", "--out", "scene.xls"), 2, "one of .svg, .png, .pdf, .html, .csv"),
         (("scene", "skop-fig3", "--out", "scene"), 2, "the ending must be one of"),
         (("scene", "skop-fig3", "--out", "scene.svg", "--json"), 2, "not allowed with"),
         (("scene", "skop-fig3", "--out", "/dev/null/scene.svg"), 5, "/dev/null/scene.svg cannot be written"),
@@ -357,3 +359,69 @@ def test_figures_of_the_shell(capsys, wet, tmp_path):
             assert path.read_bytes().startswith(start)
     assert run(capsys, "scene", *arguments, tmp_path / "again.svg")[0] == 0
     assert (tmp_path / "again.svg").read_bytes() == (tmp_path / "scene.svg").read_bytes()
+
+
+class Page(html.parser.HTMLParser):
+    """What a page is made of: elements, what they ask for from elsewhere, and its text."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.asked, self.words, self.open = set(), [], [], []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.add(tag)
+        self.open.append(tag)
+        self.asked += [value for name, value in attributes if name in ("src", "href", "xlink:href", "data", "action")]
+
+    def handle_endtag(self, tag):
+        if tag in self.open:
+            while self.open.pop() != tag:
+                pass
+
+    def handle_data(self, data):
+        if "style" not in self.open:
+            self.words.append(data)
+
+
+@pytest.mark.parametrize("compare", [False, True])
+def test_page(capsys, wet, tmp_path, compare):
+    """All that `towatlas scene` prints, escaped, beside the figure, and nothing that is fetched."""
+    more = ("--compare",) if compare else ()
+    _, printed, _ = run(capsys, "scene", wet, *more)
+    path = tmp_path / "scene.html"
+    code, out, err = run(capsys, "scene", wet, *more, "--out", path)
+    assert (code, out) == (0, "")
+    assert f"wrote {path}" in err
+    text = path.read_text(encoding="utf-8")
+    page = Page(text)
+    assert not page.tags & {"script", "link", "iframe", "object", "embed", "ship"}
+    # The colours of the bar are an image within.
+    assert all(asked.startswith(("#", "data:image/png;base64,")) for asked in page.asked)
+    assert not re.findall(r"url\((?!#)|@import|http(?!://www\.w3\.org/)", text)
+    words = " ".join("".join(page.words).replace("\u2212", "-").replace("\xa0", " ").split())
+    assert words.startswith("Survey $below$ a <ship>")
+    numbers = re.findall(r"-?\d+\.\d+", printed)
+    assert len(numbers) > 15
+    assert [number for number in numbers if number not in words] == []
+    for sentence in (*printed.split("\n\n")[0].splitlines(), printed.split("\n\n")[-1].strip()):
+        assert sentence in words
+    assert ("Comparison of the models" in words) == ("Critical speeds, vacuum model" in words) == compare
+    assert "<svg" in text
+
+
+def test_page_in_a_vacuum(capsys, tmp_path):
+    path = tmp_path / "page.html"
+    assert run(capsys, "scene", "skop-fig3", "--model", "vacuum", "--asked", "nodes", "--out", path)[0] == 0
+    words = "".join(Page(path.read_text(encoding="utf-8")).words)
+    assert "Critical speeds, vacuum model, 6 of 19" in words
+    assert "the vacuum model leaves out cable.drag_coefficient" in words
+    assert "jumps from" not in words
+
+
+def test_what_can_be_drawn_is_listed(capsys):
+    code, out, _ = run(capsys, "plot", "--help")
+    assert code == 0
+    for line in ("critical  ", "drag  ", "scene SCENE --out FILE", "shape SCENE --out FILE", "sweep SCENE"):
+        assert re.search(rf"^  {re.escape(line)}.* \w+", out, re.M), line

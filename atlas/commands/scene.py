@@ -65,7 +65,7 @@ def add(commands: Any) -> None:
         type=Path,
         metavar="FILE",
         help="instead of tables FILE.svg, .png or .pdf, all shapes from the side and from above and the jumps; "
-        "or .csv, the shapes in SI, a row a point",
+        ".html, that figure with the tables; or .csv, the shapes in SI, a row a point",
     )
     add_patience(parser)
     parser.set_defaults(run=_run)
@@ -128,9 +128,9 @@ def _run(options: argparse.Namespace) -> int:
     atlas = atlas_if_any(options.atlas)
     answer = answer_scene(scene, atlas, options.model, options.asked)
     if options.out:
-        write_scene(answer, options.out)
+        write_scene(answer, options.out, options.compare)
     else:
-        print_json(_object(answer)) if options.json else print(text_of(answer, options.compare))
+        print_json(object_of(answer)) if options.json else print(text_of(answer, options.compare))
     for note in answer.notes:
         say(note)
     for code in {int(code) for code in answer.jumps.status} - {status.OK}:
@@ -242,7 +242,8 @@ def _differences(choice: Choice) -> list[dict[str, Any]]:
     ]
 
 
-def _object(answer: SceneAnswer) -> dict[str, Any]:
+def object_of(answer: SceneAnswer) -> dict[str, Any]:
+    """Everything about a scene, for JSON."""
     scene, choice = answer.scene, answer.choice
     return {
         "title": scene.title,
@@ -285,11 +286,17 @@ def describe_speed(scene: Scene) -> str:
     )
 
 
+def head_lines(answer: SceneAnswer) -> list[str]:
+    """What is towed, how fast and in what; the model, and why this one."""
+    scene, choice = answer.scene, answer.choice
+    lines = [scene.title or scene.source, describe_speed(scene), f"towed in {MEDIA[scene.medium]}"]
+    return [*lines, *_cable_lines(scene), f"{choice.model} model: {choice.reason}"]
+
+
 def text_of(answer: SceneAnswer, compare: bool = False) -> str:
     """Everything about a scene, for people; what applies first, what other models say only to compare."""
     scene, choice = answer.scene, answer.choice
-    lines = [scene.title or scene.source, describe_speed(scene), f"towed in {MEDIA[scene.medium]}"]
-    lines += [*_cable_lines(scene), f"{choice.model} model: {choice.reason}", ""]
+    lines = [*head_lines(answer), ""]
     lines.append(f"equilibria ({choice.model} model), the fish in m, forces in N, its phase behind the tow point")
     lines.append(f"{'branch':>8} {'nodes':>5} " + " ".join(f"{name:>13}" for name in COLUMNS.values()))
     for row in _equilibria(answer):

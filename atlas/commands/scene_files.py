@@ -10,7 +10,7 @@ from towatlas.commands.common import FIGURE_FORMATS, save_figure, say
 from towatlas.scene.jumps import SceneAnswer
 from towatlas.tables.seal import check_writable
 
-FORMATS = (*FIGURE_FORMATS, ".csv")
+FORMATS = (*FIGURE_FORMATS, ".html", ".csv")
 # Along a shape, in the order of columns.
 UNITS = {"s": "m", "x": "m", "y": "m", "z": "m", "R_x": "N", "R_y": "N", "R_z": "N", "T": "N"}
 
@@ -22,13 +22,19 @@ def check_out(path: Path) -> None:
     check_writable(path)
 
 
-def write_scene(answer: SceneAnswer, path: Path) -> None:
-    """The file that its ending asks for."""
-    if path.suffix.lower() == ".csv":
-        _write_shapes(answer, path)
-        say(f"wrote {path}")
-    else:
+def write_scene(answer: SceneAnswer, path: Path, compare: bool = False) -> None:
+    """The file that its ending asks for; `compare` is for the page."""
+    kind = path.suffix.lower()
+    if kind in FIGURE_FORMATS:
         save_scene_figure(answer, path)
+        return
+    if kind == ".html":
+        from towatlas.commands.scene_page import scene_page
+
+        path.write_text(scene_page(answer, compare), encoding="utf-8")
+    else:
+        _write_shapes(answer, path)
+    say(f"wrote {path}")
 
 
 def save_scene_figure(answer: SceneAnswer, path: Path, branch: str | None = None) -> None:
