@@ -1,7 +1,7 @@
 """The figure of a scene: its shapes from the side and from above in true proportion, and the jumps about its speed."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import fill
 from typing import Any
 
@@ -12,14 +12,13 @@ from matplotlib.collections import LineCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 from numpy.typing import NDArray
 
 from towatlas.plot.labels import Label, place_labels
 from towatlas.plot.speeds import plot_speeds
 from towatlas.scene.jumps import SceneAnswer
 from towatlas.scene.scene import KNOT, Scene
-from towatlas.solve.shapes import POINTS
 
 Array = NDArray[np.float64]
 
@@ -33,8 +32,11 @@ FACTORS = np.array([digit * 10.0**power for power in range(6) for digit in (1, 2
 # A plane through tow point and fish that passes the axis by less than this share of the tow radius is one through it.
 NEAR = 0.05
 MARGIN, ARROW = 0.08, 0.15
-# Points on a half wave of a cable, at least, and letters in a line of the title.
-SMOOTH, LINE = 24, 100
+# A circle so many times as wide as the shape itself is not measured from its axis.
+FAR = 20.0
+# Points along the shape that matters and along others, and on each half wave of them, at least.
+POINTS, SMOOTH = (401, 121), (24, 12)
+LINE = 100
 OTHER: dict[str, Any] = {"color": "0.6", "linewidth": 1.0, "linestyle": (0, (4, 2)), "zorder": 2}
 AXIS: dict[str, Any] = {"color": "0.45", "linewidth": 0.8, "linestyle": (0, (8, 3, 2, 3)), "zorder": 1}
 CENTRE: dict[str, Any] = {"color": "0.45", "marker": "+", "markersize": 7, "linestyle": "none", "zorder": 1}
@@ -117,8 +119,8 @@ def plot_scene(answer: SceneAnswer, branch: str | None = None, figure: Figure | 
 def _draw_all(figure: Figure, answer: SceneAnswer, branch: str | None) -> None:
     scene, found = answer.scene, answer.equilibria
     row = found.expected if branch is None else int(np.flatnonzero(found.branch == branch)[0])
-    main = _cable(answer, row)
-    cables = [main] + [_cable(answer, k) for k in range(len(found)) if k != row and branch is None]
+    main = _cable(answer, row, 0)
+    cables = [main] + [_cable(answer, k, 1) for k in range(len(found)) if k != row and branch is None]
     columns = [_panels(view, cables, scene) for view in (_from_side(scene, main), _from_above(scene))]
     rows = max(len(column) for column in columns)
     speeds = branch is None and answer.folds is not None
@@ -159,9 +161,10 @@ def _draw_all(figure: Figure, answer: SceneAnswer, branch: str | None) -> None:
         write()
 
 
-def _cable(answer: SceneAnswer, row: int) -> _Cable:
+def _cable(answer: SceneAnswer, row: int, rank: int) -> _Cable:
     nodes = int(answer.equilibria.nodes[row])
-    curve = answer.shape(row, np.linspace(0.0, answer.scene.length, max(POINTS, SMOOTH * (nodes + 1))))
+    count = max(POINTS[rank], SMOOTH[rank] * (nodes + 1))
+    curve = answer.shape(row, np.linspace(0.0, answer.scene.length, count))
     points = np.stack([curve[name].values for name in ("x", "y", "z")])
     return _Cable(str(answer.equilibria.branch[row]), nodes, points, curve["T"].values)
 
@@ -195,6 +198,10 @@ def _panels(view: _View, cables: Sequence[_Cable], scene: Scene) -> list[_Panel]
     stretch = _stretch(closer) if view.side else 1.0
     panels = [_Panel(view, cables, bounds)]
     if stretch != 1.0 or _span(closer) < SMALL * _span(bounds):
+        width = _span(closer) if stretch == 1.0 else np.ptp(closer[0])
+        if radius > FAR * width and not view.leftwards:
+            view = replace(view, origin=main.points[:, 0], across="x from the tow point (m)")
+            closer = _bounds(view, [main.points])
         panels.append(_Panel(view, [main], closer, stretch, alone=True))
     return panels
 
@@ -228,11 +235,12 @@ def _draw(axes: Axes, panel: _Panel, scene: Scene, colours: Normalize) -> None:
     style: dict[str, Any] = {"cmap": "viridis_r", "linewidth": 2.2, "capstyle": "round", "zorder": 3}
     axes.add_collection(LineCollection(segments, array=tension, norm=colours, **style))
     if view.axis:
-        axes.axvline(0.0, **AXIS)
+        axes.axvline(-view.origin[0], **AXIS)
     if not view.side:
         turn = np.linspace(0.0, 2.0 * np.pi, 721)
-        axes.plot(scene.radius * np.cos(turn), scene.radius * np.sin(turn), **CIRCLE)
-        axes.plot(0.0, 0.0, **CENTRE)
+        circle = scene.radius * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)])
+        axes.plot(*view.of(circle), **CIRCLE)
+        axes.plot(*view.of(np.zeros((3, 1))), **CENTRE)
     for cable in others:
         other = view.of(cable.points)
         axes.plot(*other, **OTHER)
@@ -256,8 +264,9 @@ def _frame(axes: Axes, panel: _Panel) -> None:
     if stretch != 1.0:
         title += f", {'width' if stretch > 1.0 else 'depth'} stretched {max(stretch, 1.0 / stretch):g} times"
     axes.set(title=title, xlabel=view.across, ylabel=view.down)
-    axes.xaxis.set_major_locator(MaxNLocator(5))
-    axes.yaxis.set_major_locator(MaxNLocator(7))
+    for axis, most in ((axes.xaxis, 4), (axes.yaxis, 7)):
+        axis.set_major_locator(MaxNLocator(most))
+        axis.set_major_formatter(FuncFormatter(_written))
     axes.grid(color="0.93", linewidth=0.6)
 
 
@@ -266,12 +275,18 @@ def _tip(panel: _Panel, scene: Scene) -> float:
     return (-1.0 if scene.turn == "port" else 1.0) * ARROW * _span(panel.bounds)
 
 
+def _written(value: float, _: int | None) -> str:
+    """A number on an axis, by itself: nothing is put apart at the end of the axis."""
+    return f"{value:.6g}".replace("-", "\N{MINUS SIGN}")
+
+
 def _point_ahead(axes: Axes, panel: _Panel, scene: Scene) -> None:
     tip = _tip(panel, scene)
     bottom, top = axes.get_ylim()
     axes.set_ylim(max(bottom, 1.1 * tip), min(top, 1.1 * tip), auto=True)
     arrow = {"arrowstyle": "-|>", "color": "k", "linewidth": 1.0, "shrinkA": 0.0, "shrinkB": 0.0}
-    axes.annotate("", (scene.radius, tip), (scene.radius, 0.0), arrowprops=arrow)
+    at = scene.radius - panel.view.origin[0]
+    axes.annotate("", (at, tip), (at, 0.0), arrowprops=arrow)
 
 
 def _name(axes: Axes, panel: _Panel, scene: Scene) -> None:
@@ -280,7 +295,8 @@ def _name(axes: Axes, panel: _Panel, scene: Scene) -> None:
     for k, cable in enumerate(panel.cables):
         across, down = panel.view.of(cable.points)[:, -1]
         labels.append(Label(cable.name, across, down, "0.4" if k else "k"))
-    arrow = [([scene.radius, scene.radius], [0.0, _tip(panel, scene)])]
+    at = scene.radius - panel.view.origin[0]
+    arrow = [([at, at], [0.0, _tip(panel, scene)])]
     place_labels(axes, labels, [] if panel.view.side else arrow)
 
 
