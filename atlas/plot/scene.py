@@ -152,8 +152,10 @@ def _draw_all(figure: Figure, answer: SceneAnswer, branch: str | None) -> None:
     else:
         figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
     write = plot_speeds(answer, figure.add_subplot(grid[-1, :])) if speeds else None
-    # Labels are placed between things that stand where they are going to stand.
-    figure.draw_without_rendering()
+    # Labels are placed between things that stand where they are going to stand: the layout follows from the texts at
+    # ticks, they from proportions, and those from the layout.
+    for _ in range(2):
+        figure.draw_without_rendering()
     figure.set_layout_engine("none")
     for axes, panel in drawn:
         _name(axes, panel, scene)
