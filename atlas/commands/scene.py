@@ -128,7 +128,8 @@ def _run(options: argparse.Namespace) -> int:
     atlas = atlas_if_any(options.atlas)
     answer = answer_scene(scene, atlas, options.model, options.asked)
     if options.out:
-        write_scene(answer, options.out, options.compare)
+        ending = [] if answer.folds is None else [_margin(answer)]
+        write_scene(answer, options.out, ending, options.compare)
     else:
         print_json(object_of(answer)) if options.json else print(text_of(answer, options.compare))
     for note in answer.notes:

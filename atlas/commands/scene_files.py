@@ -1,6 +1,7 @@
 """The files that a scene is written to: its shapes as numbers, a figure, a page."""
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,8 @@ def check_out(path: Path) -> None:
     check_writable(path)
 
 
-def write_scene(answer: SceneAnswer, path: Path, compare: bool = False) -> None:
-    """The file that its ending asks for; `compare` is for the page."""
+def write_scene(answer: SceneAnswer, path: Path, ending: Sequence[str], compare: bool) -> None:
+    """The file that its ending asks for; a page has the lines that end the text, and with `compare` all models."""
     kind = path.suffix.lower()
     if kind in FIGURE_FORMATS:
         save_scene_figure(answer, path)
@@ -31,7 +32,7 @@ def write_scene(answer: SceneAnswer, path: Path, compare: bool = False) -> None:
     if kind == ".html":
         from towatlas.commands.scene_page import scene_page
 
-        path.write_text(scene_page(answer, compare), encoding="utf-8")
+        path.write_text(scene_page(answer, ending, compare), encoding="utf-8")
     else:
         _write_shapes(answer, path)
     say(f"wrote {path}")

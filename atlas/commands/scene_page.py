@@ -5,7 +5,7 @@ from html import escape
 from math import isfinite
 from typing import Any
 
-from towatlas.commands.scene import NO_FORCE, head_lines, object_of, text_of
+from towatlas.commands.scene import NO_FORCE, head_lines, object_of
 from towatlas.plot.scene import plot_scene
 from towatlas.report.frame import number, page, svg, table
 from towatlas.scene.choice import Choice, percent
@@ -30,16 +30,13 @@ CAPTION = (
 )
 
 
-def scene_page(answer: SceneAnswer, compare: bool = False) -> str:
-    """The page; with `compare` the other models are on it, too."""
+def scene_page(answer: SceneAnswer, ending: Sequence[str], compare: bool) -> str:
+    """The page, with the lines that end the text; with `compare` the other models are on it, too."""
     known, model = object_of(answer), answer.choice.model
     title, *lines = head_lines(answer)
     drawing = svg("scene", f"Shapes of {title}", (8.0, 8.0), lambda figure: plot_scene(answer, figure=figure))
     parts = [_lines(lines), f"<figure>\n{drawing}\n<figcaption>{CAPTION}</figcaption>\n</figure>\n"]
-    if answer.folds is not None:
-        # What ends the text: how far the nearest jumps are.
-        parts.append(_lines(text_of(answer).rpartition("\n\n")[2].splitlines()))
-    parts.append(_equilibria(known, model))
+    parts += [_lines(ending), _equilibria(known, model)]
     if model != "vacuum" and known["jumps"] is not None:
         parts.append(_jumps(known, model))
     if (compare or model == "vacuum") and known["critical_speeds"] is not None:
