@@ -18,8 +18,9 @@ DISTANCES = (6.0, 9.0, 13.0, 18.0, 25.0, 34.0, 46.0, 62.0, 84.0, 112.0, 150.0)
 DIRECTIONS = np.radians([0, 180, 45, 135, -45, -135, 90, -90, 22, 158, -22, -158, 68, 112, -68, -112])
 # Around a text, and between the points that stand for a line [points].
 GAP, STEP = 2.0, 2.0
-# A text farther away than this has a line to its point; points closer than that are one [points].
-BESIDE, SAME = 9.0, 3.0
+# A text farther from its point than BESIDE has a line to it, and keeps that distance from the points of others; without
+# a line it keeps ALOOF from them. Points closer than SAME are one [points].
+BESIDE, ALOOF, SAME = 9.0, 18.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -89,11 +90,11 @@ def place_labels(
             lead = np.linspace(anchor, centre, 50)
             lead = lead[~_inside(box, lead)] if distance > BESIDE else lead[:0]
             # Beside another point it would seem to name that one.
-            own = _pixels(axes, min(distance, BESIDE))
+            aloof = _pixels(axes, BESIDE if len(lead) else ALOOF)
             if (
                 _free(box, frame, covered, taken)
                 and not any(_inside(other, lead).any() for other in taken)
-                and not _inside(box.padded(own), strangers).any()
+                and not _inside(box.padded(aloof), strangers).any()
             ):
                 break
         else:
