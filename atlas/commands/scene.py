@@ -12,6 +12,7 @@ import numpy as np
 
 from towatlas.commands.common import OK, add_atlas, add_patience, print_json, real, say
 from towatlas.commands.common import speed as dimensionless_speed
+from towatlas.commands.scene_files import check_out, write_scene
 from towatlas.kernels import status
 from towatlas.scene.choice import Choice, percent
 from towatlas.scene.file import read_scene, scene_of_text, shipped_scenes
@@ -120,8 +121,6 @@ def atlas_if_any(path: Path) -> Atlas | None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from towatlas.commands.scene_files import check_out, write_scene
-
     if options.out:
         check_out(options.out)
     scene = scene_of(options.file, options)
