@@ -54,6 +54,7 @@ figures: install  ## draw the figures of the README from build/atlas.nc, and the
 	$(BIN)/python -m towatlas plot critical --atlas $(ATLAS) --out docs/critical.svg
 	$(BIN)/python -m towatlas plot critical --atlas $(ATLAS) --out docs/critical.png
 	$(BIN)/python -m towatlas report nrl7048 --out build/report.html
+	$(BIN)/python -m towatlas report cable-body --out build/cable-body.html
 	$(BIN)/python -m towatlas report dtmb713 --out build/dtmb713.html
 
 clean:  ## remove .venv, build and caches

@@ -152,3 +152,14 @@ class Page(HTMLParser):
         self.text.append(data)
         if "td" in self.open or "th" in self.open:
             self.rows[-1][-1] += data
+
+
+def check_stands_alone(page):
+    """The page parsed: well nested, every reference within it, nothing from elsewhere, every symbol filled in."""
+    parsed = Page(page)
+    assert len(parsed.ids) == len(set(parsed.ids))
+    assert {reference.removeprefix("#") for reference in parsed.references} <= set(parsed.ids)
+    elsewhere = re.sub(r'xmlns(:\w+)?="[^"]*"', "", page)
+    for word in ("http:", "https:", "file:", "data:", "src=", "<link", "<script", "@import", "$"):
+        assert word not in elsewhere, word
+    return parsed

@@ -1,4 +1,4 @@
-"""The report, reproduced: its page stands alone and lacks nothing, and its curves are what they say they are."""
+"""NRL Report 7048, reproduced: its page stands alone and lacks nothing, and its curves are what they say they are."""
 
 import html
 import re
@@ -6,7 +6,7 @@ import re
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from helpers import Page, run
+from helpers import Page, check_stands_alone, run
 from matplotlib.artist import Artist
 from matplotlib.lines import Line2D
 
@@ -34,12 +34,7 @@ def plain(cell):
 
 
 def test_page_stands_alone(page):
-    parsed = Page(page)
-    assert len(parsed.ids) == len(set(parsed.ids))
-    assert {reference.removeprefix("#") for reference in parsed.references} <= set(parsed.ids)
-    elsewhere = re.sub(r'xmlns(:\w+)?="[^"]*"', "", page)
-    for word in ("http:", "https:", "file:", "data:", "src=", "<link", "<script", "@import", "$"):
-        assert word not in elsewhere, word
+    check_stands_alone(page)
 
 
 def test_every_figure_is_in_the_page(page):
@@ -82,6 +77,12 @@ def test_same_bytes_twice(page, tmp_path, capsys):
     assert (code, out) == (0, "")
     assert "wrote" in err
     assert (tmp_path / "new" / "report.html").read_bytes() == page.encode()
+
+
+def test_unknown_source(capsys):
+    code, _, err = run(capsys, "report", "nrl7049")
+    assert code == 2
+    assert "'nrl7048', 'cable-body', 'dtmb713'" in err
 
 
 def test_page_of_an_unknown_kind(capsys, tmp_path):

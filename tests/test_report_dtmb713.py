@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers import Page
+from helpers import check_stands_alone, run
 from scipy.optimize import brentq, curve_fit
 
 from towatlas.report.claims import HOLDS, PART
@@ -163,9 +163,11 @@ def test_verdicts():
 
 
 @pytest.mark.slow
-def test_page():
+def test_page(capsys, tmp_path):
     page = report_page()
-    parsed = Page(page)
+    parsed = check_stands_alone(page)
+    assert run(capsys, "report", "dtmb713", "--out", tmp_path / "page.html")[0] == 0
+    assert (tmp_path / "page.html").read_bytes() == page.encode()
     text = " ".join("".join(parsed.text).split())
     for name, _, _ in DRAWN:
         assert f'<section id="{name}">' in page
