@@ -3,7 +3,6 @@
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from towatlas.solve.shots import direction_of
 from towatlas.system import System
 
 Array = NDArray[np.float64]
-FOOT, KNOT = 0.3048, 1852.0 / 3600.0  # [m], [m/s]
+KNOT = 1852.0 / 3600.0  # [m/s]
 # Coefficients of the drag across and along the cable, on its diameter.
 NORMAL, TANGENTIAL = 1.27, 0.062
 # Of the figures: radius [ft], speeds [kn], weights of the body [lbf].
@@ -40,7 +39,7 @@ ROUNDS, LONGEST_STEP, BEGIN = 40, 0.3, 0.01
 
 @dataclass(frozen=True)
 class Curve:
-    """Shapes of a system over the length of its cable, in the order of the distance of the body from the axis.
+    """Shapes of a system over the length of its cable, in the order in which they lie on one curve.
 
     Attributes
     ----------
@@ -347,4 +346,4 @@ def without_apparent_mass(scene: Scene) -> System:
     share = scene.mass_unit("water") / scene.mass_per_length
     bare = {name: share * getattr(system, name) for name in ("w_f", "C", "C_f", "C_t", "w")}
     mass = scene.fish_mass / (scene.mass_per_length * scene.radius)
-    return replace(system, **bare, m_f=mass, b_s=inf)
+    return replace(system, **bare, m_f=mass)

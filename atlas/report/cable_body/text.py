@@ -3,7 +3,7 @@
 CAPTIONS = {
     "fig3": "Fig. 3a to f: tow radius 3000 ft, body 250 lbf. a, b: short cables; c, d: long ones. The copy at hand has "
     "the axes of f alone, which end at 6 and at 250 degrees (dotted). The phase is that of the body behind the tow "
-    "point, carried along the cable: at 5 kn it passes 180 degrees at about twice the tow radius.",
+    "point, carried along the cable and not wrapped: at 5 kn it passes 180 degrees between two and three tow radii.",
     "fig4": "Fig. 4a to d: tow radius 3000 ft, 3 kn. The axes of a, b and c are those of the text.",
     "water": "10,000 ft, 250 lbf. a: at 5 kn; where a curve bends back there are three shapes at one length. Drag "
     "along the cable straightens it, from the second coefficient on for good. b: without drag along the cable, L/R = "
@@ -56,9 +56,8 @@ far from the axis as the tow point its length. So all shapes at one speed lie on
 the length. Where it only goes on to longer cables there is one shape at every length; where it turns back there are
 three, and where it turns two of them meet: a fold.</p>
 <p>Two kinds of folds are known. Those of a vacuum, the subject of NRL Report 7048, end as drag grows, and here it is
-large,
-$constants. The other kind drag makes itself. The folds below are of it: they are there without any centrifugal force,
-and of the two that make the hysteresis below the program finds the origin in $origins, not in a fold of the vacuum.</p>
+large, $constants. The other kind drag makes itself. The folds below are of it: they are there without any centrifugal
+force, and of the two that make the hysteresis the program finds the origin in $origins, not in the vacuum.</p>
 <p>Without drag along the cable $bare of the $systems systems, Table 1 and its like at 3000 ft, have three shapes at
 some length: $which. With the text's coefficient, $tangential, none has. So the text, and Choo if he had such a
 coefficient, finds one shape in water; the coefficient, not the water, is the reason. The table has systems of 250 lbf;

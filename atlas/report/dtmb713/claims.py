@@ -219,7 +219,7 @@ def _maximum() -> Claim:
         "Abstract, Discussion",
         "In most cases <i>C</i><sub>s</sub> reaches a maximum within the range of angles, in the others it levels off.",
         PART if len(inside) <= len(LETTERS) // 2 or never else HOLDS,
-        f"By the fits within the range for {_named(inside)}, which is half of them; just beyond it for "
+        f"By the fits within the range for {_named(inside)}, {len(inside)} of {len(LETTERS)}; just beyond it for "
         f"{_named(beyond)}, which level off; {_named(never)} does not: its points bend upwards (by {steeper}).",
     )
 

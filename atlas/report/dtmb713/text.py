@@ -3,12 +3,13 @@
 CAPTIONS = {
     "fig3": "Fig. 3: <i>C</i><sub>n</sub>/sin<sup>2</sup>&phi; against &phi;. Line: mean, as in the report; band: one "
     "standard deviation of a point. Behind &plusmn; stands the standard error of the mean.",
-    "fig4": "Fig. 4: <i>C</i><sub>s</sub> against sin &phi;. The report draws curves without giving a law; here "
+    "fig4": "Fig. 4: <i>C</i><sub>s</sub> against sin &phi;. The report gives no law; here "
     "<i>C</i><sub>s</sub> = <i>a</i> <i>s</i> / (1 + (<i>s</i>/<i>b</i>)<sup>2</sup>), <i>s</i> = sin &phi;, by least "
     "squares, broken where there are no points, with its maximum (triangle). It is linear at first and has one "
     "maximum, as the report says of the force; between, it is a choice. Of H, whose fit has no maximum, a line.",
-    "fig5": "Fig. 5: <i>C</i><sub>n</sub>/sin &phi; against sin &phi;. The report shows one cable and does not say "
-    "which; here are all. Solid: line through the origin; broken: <i>A</i> + <i>B</i> sin &phi;.",
+    "fig5": "Fig. 5: <i>C</i><sub>n</sub>/sin &phi; against sin &phi;. The report has a typical one and the "
+    "copy at hand does not say of which cable; here are all. Solid: line through the origin; "
+    "broken: <i>A</i> + <i>B</i> sin &phi;.",
     "directions": "Angle below the stream (circles) and to starboard (squares) as measured, against the speed; by the "
     "laws of each cable (solid); and the angle below the stream without side force (broken). The program tows each "
     "cable alone on a circle of 1000 km, at the speed of every row.",
