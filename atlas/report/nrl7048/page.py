@@ -9,6 +9,7 @@ from string import Template
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
+from towatlas.effort import check_patience
 from towatlas.report import frame
 from towatlas.report.frame import maths, number
 from towatlas.report.nrl7048.figures import (
@@ -154,12 +155,15 @@ def report_page() -> str:
     -------
     str
     """
-    rows = compare()
+    rows, figures = compare(), []
+    for k, figure in enumerate(FIGURES):
+        check_patience("figures of the page", "there is no smaller page", done=k, of=len(FIGURES))
+        figures.append(_figure(figure))
     body = Template(BODY).substitute(
         verdict=_verdict(rows),
         contents="".join(f'<li><a href="#fig{f.number}">Fig. {f.number}</a> {f.title}</li>\n' for f in FIGURES),
         numbers="".join(_number_row(row) for row in rows),
-        figures="".join(_figure(figure) for figure in FIGURES),
+        figures="".join(figures),
         models="".join(f'<th scope="col" class="n">{title}</th>' for title, _ in MODELS),
         photographs="".join(_photograph_row(photograph) for photograph in PHOTOGRAPHS),
         failures=_failures(),
