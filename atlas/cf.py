@@ -79,6 +79,28 @@ def equilibrium_variable(dims: tuple[str, ...], name: str, data: NDArray[Any], *
     return xr.Variable(dims, data, symbol_attributes(name, EQUILIBRIUM) | attributes)
 
 
+def with_units(known: xr.Variable, tow_radius: float, force: float) -> xr.Variable:
+    """A length or a force of the nomenclature in SI; what is neither stays as it is.
+
+    Parameters
+    ----------
+    known : xarray.Variable
+        With the attributes of `equilibrium_variable`.
+    tow_radius, force : float
+        What lengths [m] and forces [N] are divided by, > 0.
+
+    Returns
+    -------
+    xarray.Variable
+    """
+    words = known.attrs["long_name"]
+    for over, unit, scale in ((" over tow radius", "m", tow_radius), (" over (mu + rho A) g R", "N", force)):
+        if over in words:
+            attributes = known.attrs | {"long_name": words.replace(over, ""), "units": unit}
+            return xr.Variable(known.dims, known.values * scale, attributes)
+    return known
+
+
 def plain_table(
     *,
     n: NDArray[np.int64],
@@ -206,4 +228,29 @@ def shape_attributes(facts: dict[str, Any]) -> dict[str, Any]:
         "changes sign. error is the estimated relative error of the distance of the fish from the axis.",
         "shape",
         facts,
+    )
+
+
+def scene_shape_attributes(facts: dict[str, Any]) -> dict[str, Any]:
+    """Global attributes of the shape of one equilibrium of a scene; texts that are empty are left out.
+
+    Parameters
+    ----------
+    facts : dict
+        Others.
+
+    Returns
+    -------
+    dict
+    """
+    return _attributes(
+        "Shape of a cable towed in a circle, in SI",
+        "towatlas, shots from the fish up",
+        "At the tow point s = 0, x is the tow radius, y = 0, z = 0; x points away from the axis, z downwards; the tow "
+        "point moves along y in a turn to starboard, against it in one to port. s_node and z_node are where x changes "
+        "sign. Attributes that end in _m are in metres, _N in newtons, _m_s in metres a second; lam to b_s are the "
+        "groups of the model, dimensionless. error is the estimated relative error of the distance of the fish from "
+        "the axis.",
+        "shape",
+        {name: value for name, value in facts.items() if not isinstance(value, str) or value},
     )

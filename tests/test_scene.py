@@ -352,8 +352,8 @@ def test_examples_of_the_page(atlas_path, tmp_path):
         (tmp_path / name).write_text(scene_text)
         assert make_scene(tomllib.loads(scene_text)).medium == "water"
     environment = os.environ | {"TOWATLAS_FILE": str(atlas_path)}
-    (python,) = re.findall(r"```python\n(.*?)```", text, re.S)
-    commands = [[sys.executable, "-c", python]]
+    commands = [[sys.executable, "-c", block] for block in re.findall(r"```python\n(.*?)```", text, re.S)]
+    assert len(commands) >= 2
     lines = re.findall(r"^    towatlas (.*)$", text, re.M)
     assert len(lines) >= 4
     commands += [[sys.executable, "-m", "towatlas", *shlex.split(line, comments=True)] for line in lines]

@@ -112,11 +112,13 @@ FLUID = (
 )
 
 
-def add_cable(parser: argparse.ArgumentParser, gamma: bool = True, any_medium: bool = False) -> None:
+def add_cable(
+    parser: argparse.ArgumentParser, gamma: bool = True, any_medium: bool = False, required: bool = True
+) -> None:
     """The cable, its fish and its speed; in any medium a fish may float and a turn go to port."""
     fish, rate = (number, turn) if any_medium else (weight, speed)
-    parser.add_argument("--lam", type=length, required=True, metavar="LAMBDA", help=EQUILIBRIUM["lam"].long_name)
-    parser.add_argument("--wf", type=fish, required=True, metavar="W_F", help=EQUILIBRIUM["w_f"].long_name)
+    parser.add_argument("--lam", type=length, required=required, metavar="LAMBDA", help=EQUILIBRIUM["lam"].long_name)
+    parser.add_argument("--wf", type=fish, required=required, metavar="W_F", help=EQUILIBRIUM["w_f"].long_name)
     if gamma:
         parser.add_argument("--gamma", type=rate, required=True, metavar="GAMMA", help=EQUILIBRIUM["gamma"].long_name)
 

@@ -7,17 +7,33 @@ from typing import Any
 from towatlas.commands.common import FIGURE_FORMATS, OK, add_atlas, add_patience, new_figure, save_figure
 from towatlas.tables.atlas import open_atlas
 
+FIGURES = {
+    "critical": "critical speeds against cable length, from an atlas",
+    "drag": "how drag closes the jumps, solved",
+}
+ELSEWHERE = {
+    "scene SCENE --out FILE": "its shapes from the side and from above, its jumps",
+    "shape SCENE --out FILE": "one of these shapes, in m and N",
+    "shape --lam ... --out FILE": "the shape of a cable without units",
+    "sweep SCENE ... --out FILE": "depth, radius, tension, phase over length or speed",
+    "report": "a source document with its figures, as a page",
+}
+
+
+def _listed(title: str, figures: dict[str, str]) -> str:
+    return "\n".join([title, *(f"  {name:<27} {words}" for name, words in figures.items())])
+
 
 def add(commands: Any) -> None:
     """Declare the command."""
     parser = commands.add_parser(
-        "plot", help="draw a figure", description="Draw a figure: `critical` from an atlas, `drag` solved."
+        "plot",
+        help="draw a figure",
+        description="Draw a figure.",
+        epilog=_listed("figures:", FIGURES) + "\n\n" + _listed("by other commands, towatlas ...", ELSEWHERE),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument(
-        "figure",
-        choices=("critical", "drag"),
-        help="critical: speeds against cable length; drag: how drag closes the jumps, solved",
-    )
+    parser.add_argument("figure", choices=tuple(FIGURES), help="one of those below")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="FILE.svg, .png or .pdf")
     add_atlas(parser)
     add_patience(parser)

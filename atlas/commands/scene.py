@@ -12,6 +12,7 @@ import numpy as np
 
 from towatlas.commands.common import OK, add_atlas, add_patience, print_json, real, say
 from towatlas.commands.common import speed as dimensionless_speed
+from towatlas.commands.scene_files import check_out, write_scene
 from towatlas.kernels import status
 from towatlas.scene.choice import Choice, percent
 from towatlas.scene.file import read_scene, scene_of_text, shipped_scenes
@@ -58,7 +59,15 @@ def add(commands: Any) -> None:
         "--compare", action="store_true", help="also groups and critical speeds by the other models, and the comparison"
     )
     add_atlas(parser)
-    parser.add_argument("--json", action="store_true", help="one object instead of tables, with all of it")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--json", action="store_true", help="one object instead of tables, with all of it")
+    where.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="instead of tables FILE.svg, .png or .pdf, all shapes from the side and from above and the jumps; "
+        ".html, that figure with the tables; or .csv, the shapes in SI, a row a point",
+    )
     add_patience(parser)
     parser.set_defaults(run=_run)
 
@@ -91,12 +100,12 @@ def quantity(unit: str, bare: str | None = None) -> Any:
     return positive
 
 
-def add_speed(parser: argparse.ArgumentParser) -> None:
-    """Arguments that put another speed in place of the scene's."""
+def add_speed(parser: argparse.ArgumentParser, rate: Any = dimensionless_speed) -> None:
+    """Arguments that put another speed in place of the scene's; `rate` is the type of a dimensionless one."""
     group = parser.add_mutually_exclusive_group()
     group.add_argument("--speed", type=quantity("m/s"), metavar="V", help="of the tow point, as 3kn; bare: m/s")
     group.add_argument("--rpm", type=quantity("rad/s", "rpm"), metavar="N", help="turns a minute")
-    group.add_argument("--gamma", type=dimensionless_speed, metavar="GAMMA", help="Omega sqrt(R/g)")
+    group.add_argument("--gamma", type=rate, metavar="GAMMA", help="Omega sqrt(R/g)")
 
 
 def scene_of(path: str, options: argparse.Namespace) -> Scene:
@@ -112,10 +121,16 @@ def atlas_if_any(path: Path) -> Atlas | None:
 
 
 def _run(options: argparse.Namespace) -> int:
+    if options.out:
+        check_out(options.out)
     scene = scene_of(options.file, options)
     atlas = atlas_if_any(options.atlas)
     answer = answer_scene(scene, atlas, options.model, options.asked)
-    print_json(_object(answer)) if options.json else print(text_of(answer, options.compare))
+    if options.out:
+        ending = [] if answer.folds is None else [_margin(answer)]
+        write_scene(answer, options.out, ending, options.compare)
+    else:
+        print_json(object_of(answer)) if options.json else print(text_of(answer, options.compare))
     for note in answer.notes:
         say(note)
     for code in {int(code) for code in answer.jumps.status} - {status.OK}:
@@ -227,7 +242,8 @@ def _differences(choice: Choice) -> list[dict[str, Any]]:
     ]
 
 
-def _object(answer: SceneAnswer) -> dict[str, Any]:
+def object_of(answer: SceneAnswer) -> dict[str, Any]:
+    """Everything about a scene, for JSON."""
     scene, choice = answer.scene, answer.choice
     return {
         "title": scene.title,
@@ -270,11 +286,17 @@ def describe_speed(scene: Scene) -> str:
     )
 
 
+def head_lines(answer: SceneAnswer) -> list[str]:
+    """What is towed, how fast and in what; the model, and why this one."""
+    scene, choice = answer.scene, answer.choice
+    lines = [scene.title or scene.source, describe_speed(scene), f"towed in {MEDIA[scene.medium]}"]
+    return [*lines, *_cable_lines(scene), f"{choice.model} model: {choice.reason}"]
+
+
 def text_of(answer: SceneAnswer, compare: bool = False) -> str:
     """Everything about a scene, for people; what applies first, what other models say only to compare."""
     scene, choice = answer.scene, answer.choice
-    lines = [scene.title or scene.source, describe_speed(scene), f"towed in {MEDIA[scene.medium]}"]
-    lines += [*_cable_lines(scene), f"{choice.model} model: {choice.reason}", ""]
+    lines = [*head_lines(answer), ""]
     lines.append(f"equilibria ({choice.model} model), the fish in m, forces in N, its phase behind the tow point")
     lines.append(f"{'branch':>8} {'nodes':>5} " + " ".join(f"{name:>13}" for name in COLUMNS.values()))
     for row in _equilibria(answer):

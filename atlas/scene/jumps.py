@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from towatlas.effort import check_foreseen, check_patience
 from towatlas.kernels import status
@@ -14,12 +15,16 @@ from towatlas.scene.angles import Angles, angles_along, extrapolation
 from towatlas.scene.choice import Choice, least_model
 from towatlas.scene.models import QUESTIONS
 from towatlas.scene.scene import Scene, patient_with
+from towatlas.scene.shapes import shape_in_si
 from towatlas.solve.critical import SECONDS_A_HALF_WAVE, solve_critical
 from towatlas.solve.folds import name_folds
 from towatlas.solve.members import REMEDY
 from towatlas.solve.passed import guess_passed
 from towatlas.tables.atlas import Atlas
 from towatlas.tables.critical import CriticalTable
+
+if TYPE_CHECKING:
+    import xarray
 
 # A jump is near where its speed is within this share of the scene's.
 NEAR = 0.1
@@ -113,6 +118,40 @@ class SceneAnswer:
     def equilibria(self) -> Equilibria:
         """Those of the model used, dimensionless."""
         return self.choice.answer.equilibria
+
+    def shape(self, root: str | int = "expected", s: ArrayLike | None = None) -> "xarray.Dataset":
+        """Shape, forces and tension of one of the equilibria, in SI.
+
+        Parameters
+        ----------
+        root : str or int
+            Which, as in `towatlas.shape`: "expected", the name of a branch, or a row of the equilibria.
+        s : array_like, optional
+            Arc lengths from the tow point [m], from 0 to the length of the cable in any order; 401 of them, evenly
+            spaced, by default.
+
+        Returns
+        -------
+        xarray.Dataset
+            As of `towatlas.shape`: x, y, z [m], R_x, R_y, R_z, T [N] over the coordinate s [m], and s_node, z_node [m].
+            Attributes: the scene, the model and its groups, branch, nodes, whether it is expected, the position of the
+            fish, tension and reaction at the tow point, and error.
+
+        Raises
+        ------
+        ValueError
+            For a root that does not exist, and arc lengths off the cable.
+        ArithmeticError
+            If the computation overflows.
+
+        Examples
+        --------
+        >>> from towatlas.scene.file import read_scene
+        >>> curve = answer_scene(read_scene("skop-fig3"), model="vacuum").shape(s=[0.0, 0.6604])
+        >>> [round(float(x), 4) for x in curve.x], curve.x.attrs["units"]
+        ([0.0175, -0.0008], 'm')
+        """
+        return shape_in_si(self.scene, self.choice.model, self.equilibria, root, s)
 
 
 def critical_speeds(*, lam: float, w_f: float, gamma: float, atlas: Atlas | None = None) -> Jumps:
