@@ -14,9 +14,12 @@ import pytest
 from helpers import WET, changed, run
 
 import towatlas
+from towatlas.scene import choice as scene_choice
+from towatlas.scene import jumps as scene_jumps
 from towatlas.scene import keys as scene_keys
 from towatlas.scene.file import SceneFileError, make_scene, read_scene, shipped_scenes
 from towatlas.scene.jumps import critical_speeds
+from towatlas.scene.models import solve_model
 from towatlas.scene.scene import MODELS
 from towatlas.scene.units import parse_quantity
 
@@ -311,6 +314,46 @@ def test_an_atlas_of_something_else(capsys, equilibria_path):
     code, out, _ = run(capsys, "scene", "skop-fig4", "--json", "--model", "vacuum", "--atlas", equilibria_path)
     assert code == 0
     assert {row["source"] for row in json.loads(out)["critical_speeds"]} == {"solved"}
+
+
+def test_critical_speeds_of_the_vacuum_only_where_it_counts(ask):
+    """Null where another model is used and the vacuum is not compared; the same numbers where it is."""
+    names = ("transitions", "critical_speeds")
+    used, left, compared = (
+        json.loads(ask("scene", "skop-fig3", "--json", "--asked", "nodes", *more)[1])
+        for more in (("--model", "vacuum"), ("--model", "air"), ("--model", "air", "--compare"))
+    )
+    assert [left[name] for name in names] == [None, None]
+    assert [compared[name] for name in names] == [used[name] for name in names]
+    assert used["transitions"] == 19
+
+
+def test_what_a_vacuum_refuses_is_answered_in_water(monkeypatch):
+    """Its critical speeds are not asked for, and a smaller model whose shots take too long is left out, and said."""
+
+    def refuse(**cable):
+        raise towatlas.TooMuchWork("too many critical speeds")
+
+    monkeypatch.setattr(scene_jumps, "critical_speeds", refuse)
+    wet = make_scene(WET)
+    plain = towatlas.answer_scene(wet, asked=("position",))
+    assert (plain.choice.model, plain.jumps) == ("water", None)
+    with pytest.raises(towatlas.TooMuchWork, match="too many critical speeds"):
+        towatlas.answer_scene(wet, asked=("position",), compare=True)
+
+    def impatient(scene, model, *rest):
+        if model in refused:
+            raise towatlas.TooMuchWork(f"long shots in {model}")
+        return solve_model(scene, model, *rest)
+
+    monkeypatch.setattr(scene_choice, "solve_model", impatient)
+    refused = {"vacuum", "air"}
+    answer = towatlas.answer_scene(wet, asked=("position",))
+    assert list(answer.equilibria.r_f) == list(plain.equilibria.r_f)
+    assert "vacuum was not tried: it takes too long: long shots in vacuum; air was not tried" in answer.choice.reason
+    refused = {"water"}
+    with pytest.raises(towatlas.TooMuchWork, match="long shots in water"):
+        towatlas.answer_scene(wet, asked=("position",))
 
 
 def test_a_cable_without_transitions(ask, tmp_path):

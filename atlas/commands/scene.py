@@ -114,11 +114,12 @@ def atlas_if_any(path: Path) -> Atlas | None:
 def _run(options: argparse.Namespace) -> int:
     scene = scene_of(options.file, options)
     atlas = atlas_if_any(options.atlas)
-    answer = answer_scene(scene, atlas, options.model, options.asked)
+    answer = answer_scene(scene, atlas, options.model, options.asked, options.compare)
     print_json(_object(answer)) if options.json else print(text_of(answer, options.compare))
     for note in answer.notes:
         say(note)
-    for code in {int(code) for code in answer.jumps.status} - {status.OK}:
+    codes = {int(code) for code in answer.jumps.status} if answer.jumps is not None else set()
+    for code in codes - {status.OK}:
         say(f"a critical speed could not be had: {status.SENTENCES[code]}")
     return OK
 
@@ -245,9 +246,10 @@ def _object(answer: SceneAnswer) -> dict[str, Any]:
         "groups": _groups(scene, scene.medium),
         "groups_by_model": {model: _groups(scene, model) for model in MODELS},
         "speed": speeds(scene, scene.gamma),
-        "transitions": answer.jumps.existing,
+        # Of the vacuum: known where that is the model used, or compared.
+        "transitions": None if answer.jumps is None else answer.jumps.existing,
         "critical_speeds_model": "vacuum",
-        "critical_speeds": _jumps(scene, answer.jumps),
+        "critical_speeds": None if answer.jumps is None else _jumps(scene, answer.jumps),
         # None were looked for where speeds were not asked for.
         "jumps": None if answer.folds is None else _folds(answer),
         "jumps_looked_at": None if answer.folds is None else [speeds(scene, scene.gamma * share) for share in LOOKED],
@@ -284,7 +286,7 @@ def text_of(answer: SceneAnswer, compare: bool = False) -> str:
     lines.append("")
     if choice.model != "vacuum" and answer.folds is not None:
         lines += [*_fold_lines(answer), ""]
-    if choice.model == "vacuum" or compare:
+    if answer.jumps is not None:
         lines += [*_jump_lines(answer), ""]
     lines += _group_lines(scene, MODELS if compare else (choice.model,))
     if compare and choice.differences:
@@ -372,6 +374,7 @@ def _fold_lines(answer: SceneAnswer) -> list[str]:
 
 def _jump_lines(answer: SceneAnswer) -> list[str]:
     scene, jumps = answer.scene, answer.jumps
+    assert jumps is not None
     if not jumps.existing:
         return ["the cable is too short for a jump: it has no critical speed (vacuum model)"]
     lines = [f"critical speeds (vacuum model), {len(jumps.n)} of {jumps.existing}"]
