@@ -100,7 +100,7 @@ class SceneAnswer:
     @property
     def notes(self) -> list[str]:
         """What whoever asks should know: of the scene, what no model looked at, where laws are extrapolated."""
-        notes = list(self.scene.notes)
+        notes = [*self.scene.notes, *self.scene.not_given(self.choice.model)]
         largest = self.choice.answers[-1].model
         # What a larger model confirmed is known to do nothing.
         if self.scene.density and (keys := self.scene.left_out.get(largest)):
