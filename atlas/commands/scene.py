@@ -8,17 +8,18 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from towatlas.commands.common import OK, add_atlas, add_patience, print_json, real, say
+from towatlas.commands import scene_margins as margins
+from towatlas.commands.common import add_atlas, add_patience, print_json, real, say
 from towatlas.commands.common import speed as dimensionless_speed
 from towatlas.kernels import status
 from towatlas.scene.choice import Choice, percent
 from towatlas.scene.file import read_scene, scene_of_text, shipped_scenes
 from towatlas.scene.jumps import LOOKED, NEAR, Jumps, SceneAnswer, answer_scene
 from towatlas.scene.library import LARGEST
+from towatlas.scene.margins import margins_of
 from towatlas.scene.models import QUESTIONS, check_questions
 from towatlas.scene.scene import KNOT, MODELS, Scene
+from towatlas.scene.sensitivities import sensitivities_of
 from towatlas.tables.atlas import Atlas, open_atlas
 
 MEDIA = {"vacuum": "a vacuum", "air": "a nondense fluid", "water": "a dense fluid"}
@@ -56,6 +57,15 @@ def add(commands: Any) -> None:
     )
     parser.add_argument(
         "--compare", action="store_true", help="also groups and critical speeds by the other models, and the comparison"
+    )
+    parser.add_argument(
+        "--margin",
+        type=margins.margin,
+        metavar="M",
+        help="exit code 6 if a jump is nearer to the speed than M, as 10%% or 0.5kn",
+    )
+    parser.add_argument(
+        "--sensitivities", action="store_true", help="also how jumps, depth and tensions move with each key"
     )
     add_atlas(parser)
     parser.add_argument("--json", action="store_true", help="one object instead of tables, with all of it")
@@ -113,15 +123,24 @@ def atlas_if_any(path: Path) -> Atlas | None:
 
 def _run(options: argparse.Namespace) -> int:
     scene = scene_of(options.file, options)
+    asked = None if options.margin is None else margins.distance(scene, options.margin)
+    if asked is not None and "speeds" not in options.asked:
+        raise ValueError("--margin is a distance from jumps, which are not looked for without --asked speeds")
     atlas = atlas_if_any(options.atlas)
     answer = answer_scene(scene, atlas, options.model, options.asked, options.compare)
-    print_json(_object(answer)) if options.json else print(text_of(answer, options.compare))
+    slopes = sensitivities_of(answer) if options.sensitivities else None
+    found = margins_of(answer, slopes)
+    if options.json:
+        print_json(_object(answer) | margins.as_object(found, asked, slopes))
+    else:
+        table = [*margins.slope_lines(slopes), ""] if slopes else []
+        print("\n".join([text_of(answer, options.compare), "", *table, *margins.lines_of(found, answer)]))
     for note in answer.notes:
         say(note)
     codes = {int(code) for code in answer.jumps.status} if answer.jumps is not None else set()
     for code in codes - {status.OK}:
         say(f"a critical speed could not be had: {status.SENTENCES[code]}")
-    return OK
+    return margins.judge(found, asked)
 
 
 def speeds(scene: Scene, gamma: float) -> dict[str, float | None]:
@@ -291,29 +310,7 @@ def text_of(answer: SceneAnswer, compare: bool = False) -> str:
     lines += _group_lines(scene, MODELS if compare else (choice.model,))
     if compare and choice.differences:
         lines += ["", *_difference_lines(choice)]
-    if answer.folds is not None:
-        lines += ["", _margin(answer)]
     return "\n".join(lines)
-
-
-def _margin(answer: SceneAnswer) -> str:
-    """How far the speed is from the jumps beside it."""
-    scene, folds = answer.scene, answer.folds
-    assert folds is not None
-    here, speeds_of = abs(scene.gamma), np.abs(folds.gamma)
-    words = []
-    for side, beside in (("below", speeds_of[speeds_of <= here]), ("above", speeds_of[speeds_of > here])):
-        if not len(beside):
-            words.append(f"none {side} down to" if side == "below" else f"none {side} up to")
-            words[-1] += f" {_cell(scene.speed_of(here * LOOKED[side == 'above']), 4)} m/s"
-            continue
-        nearest = float(beside.max() if side == "below" else beside.min())
-        speed = scene.speed_of(nearest)
-        words.append(
-            f"{_cell(speed, 5)} m/s, {_cell(speed / KNOT, 5)} kn {side} ({100.0 * (nearest / here - 1.0):+.2g} %)"
-        )
-    known = "" if folds.complete else "; not everywhere made out: others may lie between"
-    return f"nearest jumps ({answer.choice.model} model): {'; '.join(words)}{known}"
 
 
 def _group_lines(scene: Scene, models: Sequence[str]) -> list[str]:
