@@ -134,9 +134,9 @@ def test_a_margin_is_an_exit_code(capsys, asked, code):
         (("--margin=-5%",), "-5% is not positive"),
         (("--margin", "-5%"), "expected one argument"),
         (("--margin", "0%"), "0% is not positive"),
-        (("--margin", "5 kg"), "'5 kg' is not a speed"),
+        (("--margin", "5 kg"), "'5 kg' is not a speed; write it as \"3 kn\"; or a share, as 10%"),
         (("--margin", "1 +- 1 %"), "takes no standard deviation"),
-        (("--margin", "200%"), "--margin is 200 % of the speed; jumps are looked for within 97 %"),
+        (("--margin", "200%"), "--margin is 200 % of the speed; jumps are looked for within 96.7 %"),
         (("--margin", "5%", "--asked", "nodes"), "not looked for without --asked speeds"),
     ],
 )
@@ -168,7 +168,7 @@ def test_jumps_not_made_out_are_no_margin(capsys, monkeypatch):
     assert json.loads(run(capsys, *ASK, "--margin", "1%", "--json")[1])["margin_kept"] is None
 
 
-def test_what_cannot_be_computed_is_said(capsys, monkeypatch):
+def test_what_cannot_be_computed_is_said(capsys, monkeypatch, tmp_path):
     """The answer stands; what a jump costs, and what pulls hardest, is said not to be known."""
 
     def fail(*arguments):
@@ -182,6 +182,20 @@ def test_what_cannot_be_computed_is_said(capsys, monkeypatch):
     assert "largest tension along the cable: not computed" in out
     answer = json.loads(run(capsys, *ASK, "--json")[1])
     assert (answer["largest_tension_N"], answer["nearest_jumps"]["above"]["before"]) == (None, None)
+    strong = make_scene(changed(cable__breaking_strength=1e9))
+    assert margins_of(answer_scene(strong, model="vacuum")).breaks is False
+    text = "[cable]\nlength = '8 m +- 1 m'\nmass_per_length = 1\nbreaking_strength = '9 kN'\n"
+    (tmp_path / "scene.toml").write_text(f"{text}[tow]\nradius = 1\nspeed = 2\n[fluid]\nname = 'vacuum'\n")
+    monkeypatch.setattr(margins, "sensitivities_of", fail)
+    code, _, err = run(capsys, "scene", tmp_path / "scene.toml")
+    assert code == 1
+    assert "that it is below cable.breaking_strength is not known" in err
+    # A jump whose interval is not known may be anywhere.
+    code, out, err = run(capsys, "scene", tmp_path / "scene.toml", "--margin", "1%")
+    assert code == 6
+    assert "what the uncertainty of cable.length does could not be computed: too long" in out
+    assert "+- unknown" in out
+    assert "whose interval is not known" in err
 
 
 def test_sensitivities_of_the_shell(capsys):

@@ -81,6 +81,12 @@ def test_where_no_deviation_is_taken():
         make_scene(changed(cable__breaking_strength="0 N"))
 
 
+def test_a_value_that_is_hardly_known_is_asked_about():
+    (note,) = make_scene(changed(cable__drag_coefficient="1.4 +- 60 %")).notes
+    assert note.startswith("cable.drag_coefficient = '1.4 +- 60 %' is hardly known")
+    assert make_scene(changed(cable__drag_coefficient="1.4 +- 40 %")).notes == ()
+
+
 def test_deviations_of_a_scene():
     """Those of keys go with them: another speed or length is exact, a key of the scene goes before that of its type."""
     scene = make_scene(changed(cable__length="150 m +- 2 m", tow__speed="4 kn +- 0.1 kn", fish__mass="60 kg +- 5 %"))

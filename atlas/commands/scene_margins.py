@@ -35,7 +35,8 @@ def margin(text: str) -> tuple[float, bool]:
     try:
         value = parse_quantity("value", text, "" if share else "m/s")
     except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error).removeprefix("value = ")) from None
+        problem = str(error).removeprefix("value = ")
+        raise argparse.ArgumentTypeError(f"{problem}; or a share, as 10%") from None
     if value <= 0.0:
         raise argparse.ArgumentTypeError(f"{text} is not positive")
     return value, share
@@ -48,7 +49,7 @@ def distance(scene: Scene, asked: tuple[float, bool]) -> float:
     part = value if share else value / scene.speed
     if part > widest:
         raise ValueError(
-            f"--margin is {100 * part:.3g} % of the speed; jumps are looked for within {100 * widest:.2g} %"
+            f"--margin is {100 * part:.3g} % of the speed; jumps are looked for within {100 * widest:.3g} %"
         )
     return part * scene.speed
 
@@ -56,7 +57,10 @@ def distance(scene: Scene, asked: tuple[float, bool]) -> float:
 def judge(found: Margins, asked: float | None) -> int:
     """The exit code, and on standard error why."""
     code = OK
-    if found.breaks:
+    if found.scene.breaking_strength > 0.0 and math.isnan(found.largest_tension):
+        say("the largest tension could not be computed: that it is below cable.breaking_strength is not known")
+        code = FAILED
+    elif found.breaks:
         force, unit = _units(found.scene)["N"]
         over = f"{_digits(found.largest_tension / force, 5)} {unit}"
         strength = f"{_digits(found.scene.breaking_strength / force, 5)} {unit}"
@@ -67,7 +71,8 @@ def judge(found: Margins, asked: float | None) -> int:
     if asked is None:
         return code
     for jump in found.within(asked):
-        say(f"within the margin of {asked:.4g} m/s: the jump {jump.side}, {_speed(found.scene, jump.speed)}")
+        unknown = ", whose interval is not known" if math.isnan(jump.distance_deviation) else ""
+        say(f"within the margin of {asked:.4g} m/s: the jump {jump.side}, {_speed(found.scene, jump.speed)}{unknown}")
         code = LIMIT
     if code == OK and not found.complete:
         say("jumps were not everywhere made out: that none lies within the margin is not known")
@@ -81,6 +86,7 @@ def as_object(found: Margins, asked: float | None, known: Sensitivities | None) 
     spread = found.deviations
     return {
         "uncertain": scene.deviations,
+        "uncertain_failure": found.failure or None,
         "depth_sd_m": real(spread.get("depth", math.nan)),
         "tension_sd_N": real(spread.get("tension", math.nan)),
         "largest_tension_N": real(found.largest_tension),
@@ -172,7 +178,11 @@ def lines_of(found: Margins, answer: SceneAnswer) -> list[str]:
     """The last lines: what pulls hardest, and the nearest jumps."""
     scene, spread, units = found.scene, found.deviations, _units(found.scene)
     lines = []
-    if spread:
+    if found.failure:
+        lines.append(
+            f"what the uncertainty of {', '.join(scene.deviations)} does could not be computed: {found.failure}"
+        )
+    elif spread:
         k = answer.equilibria.expected
         depth = float(answer.equilibria.z_f[k]) * scene.radius
         lines.append(
@@ -198,7 +208,7 @@ def _jump_line(jump: NearestJump, found: Margins, model: str, units: dict[str, t
     if not jump.exists:
         return f"{start} none {'down' if jump.side == 'below' else 'up'} to {jump.looked:.4g} m/s"
     text = f"{start} {_speed(found.scene, jump.speed)} ({_percent(jump.distance)})"
-    if jump.deviation or jump.distance_deviation:
+    if jump.deviation != 0.0 or jump.distance_deviation != 0.0:
         text += f" +- {_sd(jump.deviation, 1.0, 'm/s')}"
     if jump.may_be_passed:
         text += ", so near for what is known of the scene that it may be passed already"

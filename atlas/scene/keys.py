@@ -9,6 +9,8 @@ from towatlas.scene.units import parse_quantity, parse_uncertain
 
 TEXT = "text"
 SIDES = ("starboard", "port")
+# Deviations above this share of a value are asked about.
+LARGE = 0.5
 ON = ("d", "pi d")
 # A key's SI unit, or the words that it may be.
 Keys = Mapping[str, str | tuple[str, ...]]
@@ -112,7 +114,7 @@ def parse_scene(table: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, flo
     deviations : dict of float
         Standard deviations of those that have one, > 0.
     questions : list of str
-        About values of unusual size.
+        About values of unusual size, and deviations as large as their values.
 
     Raises
     ------
@@ -142,7 +144,13 @@ def parse_scene(table: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, flo
                 deviations[name] = deviation
         else:
             values[name] = parse_value(name, value, unit)
-    return values, deviations, [text for name, value in flat.items() if (text := _question(name, value, values[name]))]
+    questions = [text for name, value in flat.items() if (text := _question(name, value, values[name]))]
+    questions += [
+        f"{name} = {short(flat[name])} is hardly known: what follows to first order from its deviation says little"
+        for name, deviation in deviations.items()
+        if deviation > LARGE * abs(values[name])
+    ]
+    return values, deviations, questions
 
 
 def parse_value(name: str, value: Any, unit: str | tuple[str, ...]) -> Any:

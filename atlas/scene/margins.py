@@ -1,7 +1,8 @@
 """How far a scene is from trouble: the nearest jumps, what they cost, and the largest tension along its cable."""
 
+from contextlib import suppress
 from dataclasses import dataclass
-from math import nan
+from math import isnan, nan
 
 import numpy as np
 
@@ -81,9 +82,9 @@ class NearestJump:
     distance : float
         Its speed over that of the scene, less 1 [-]; nan where there is none.
     deviation : float
-        Standard deviation of its speed [m/s]; 0 where no key is uncertain.
+        Standard deviation of its speed [m/s]; 0 where no key is uncertain, nan where not known.
     distance_deviation : float
-        Standard deviation of the difference of the speeds [m/s].
+        Standard deviation of the difference of the speeds [m/s]; the same.
     cost : Cost or None
         None where there is no jump, or it could not be computed.
     failure : str
@@ -128,7 +129,9 @@ class Margins:
         Where, along the cable from the tow point [m], >= 0.
     deviations : dict of float
         Standard deviations to first order of "depth" [m], "tension" and "largest_tension" [N], and of what the strength
-        has left over, "breaking_margin" [N]; empty where no key is uncertain.
+        has left over, "breaking_margin" [N]; empty where no key is uncertain, nan where not known.
+    failure : str
+        Why they are not known; else empty.
     """
 
     scene: Scene
@@ -137,6 +140,7 @@ class Margins:
     largest_tension: float
     at: float
     deviations: dict[str, float]
+    failure: str
 
     @property
     def breaking_ratio(self) -> float:
@@ -145,12 +149,12 @@ class Margins:
 
     @property
     def breaks(self) -> bool:
-        """Whether the largest tension is above the breaking strength, within one standard deviation."""
+        """Whether the largest tension is above the breaking strength, or one standard deviation of the two from it."""
         left = self.scene.breaking_strength - self.largest_tension
-        return left < self.deviations.get("breaking_margin", 0.0)
+        return not (isnan(left) or left >= self.deviations.get("breaking_margin", 0.0))
 
     def within(self, distance: float) -> list[NearestJump]:
-        """Jumps nearer to the speed of the scene than a distance, at the near end of their intervals.
+        """Jumps nearer to the speed of the scene than a distance, at the near end of their intervals if that is known.
 
         Parameters
         ----------
@@ -163,7 +167,9 @@ class Margins:
         """
         speed = self.scene.speed
         return [
-            jump for jump in self.jumps if jump.exists and abs(jump.speed - speed) - jump.distance_deviation <= distance
+            jump
+            for jump in self.jumps
+            if jump.exists and not abs(jump.speed - speed) - jump.distance_deviation > distance
         ]
 
 
@@ -199,29 +205,39 @@ def margins_of(answer: SceneAnswer, known: Sensitivities | None = None) -> Margi
     [('below', -0.941, 'lost'), ('above', 1.292, 'overtaken')]
     """
     scene, found = answer.scene, answer.equilibria
+    failure = ""
     with patient_with(scene):
+        # What cannot be had is said: the answer for the scene stands.
         if known is None and scene.deviations:
-            known = sensitivities_of(answer)
-        try:
-            tension, s = largest_tension(found, found.expected)
-        except ArithmeticError:
-            tension, s = nan, nan
+            try:
+                known = sensitivities_of(answer)
+            except ArithmeticError as error:
+                failure = str(error)
+        tension, at = nan, nan
+        if known is not None:
+            tension, at = known["largest_tension"].value, known.place
+        else:
+            with suppress(ArithmeticError):
+                tension, at = largest_tension(found, found.expected)
+                tension, at = tension * scene.force_unit(answer.choice.model), at * scene.radius
         jumps: tuple[NearestJump, ...] = ()
         if (folds := answer.folds) is not None:
             sides = zip(("below", "above"), folds.beside(scene.gamma), strict=True)
-            jumps = tuple(_jump(answer, folds, side, at, known) for side, at in sides)
+            jumps = tuple(_jump(answer, folds, side, k, known) for side, k in sides)
     return Margins(
         scene=scene,
         jumps=jumps,
         complete=answer.folds is None or answer.folds.complete,
-        largest_tension=tension * scene.force_unit(answer.choice.model),
-        at=s * scene.radius,
-        deviations={} if known is None or not scene.deviations else _deviations(scene, known),
+        largest_tension=tension,
+        at=at,
+        deviations=_deviations(scene, known) if scene.deviations else {},
+        failure=failure,
     )
 
 
-def _deviations(scene: Scene, known: Sensitivities) -> dict[str, float]:
-    found = {name: known.deviation(known[name].slopes) for name in ("depth", "tension", "largest_tension")}
+def _deviations(scene: Scene, known: Sensitivities | None) -> dict[str, float]:
+    names = ("depth", "tension", "largest_tension")
+    found = {name: nan if known is None else known.deviation(known[name].slopes) for name in names}
     strength = scene.deviations.get("cable.breaking_strength", 0.0)
     return found | {"breaking_margin": float(np.hypot(found["largest_tension"], strength))}
 
@@ -232,7 +248,7 @@ def _jump(answer: SceneAnswer, folds: Folds, side: str, at: int, known: Sensitiv
     if at < 0:
         return NearestJump(side, nan, looked, nan, 0.0, 0.0, None, "")
     speed = float(scene.speed_of(abs(folds.gamma[at])))
-    deviation = apart = 0.0
+    deviation = apart = nan if scene.deviations else 0.0
     if known is not None and scene.deviations:
         slopes = known[f"jump_{side}"].slopes
         deviation, apart = known.deviation(slopes), known.deviation(slopes - known["speed"].slopes)

@@ -65,12 +65,15 @@ class Sensitivities:
     quantities : tuple of Quantity
         "jump_below", "jump_above" where there are such, "depth", "tension" at the tow point and "largest_tension" of
         the shape expected; the "speed" of the scene last.
+    place : float
+        Where the tension is largest, along the cable from the tow point [m], >= 0.
     """
 
     keys: tuple[str, ...]
     values: Array
     deviations: Array
     quantities: tuple[Quantity, ...]
+    place: float
 
     def __getitem__(self, name: str) -> Quantity:
         return next(quantity for quantity in self.quantities if quantity.name == name)
@@ -208,7 +211,7 @@ class KeySlopes:
         slopes = speed * (self._total(-rho[:, BY_NUMBER] / rho[:, BY_GAMMA]) + self.log_speed)
         return Quantity(name, "m/s", speed, slopes)
 
-    def shape(self, found: Equilibria) -> list[Quantity]:
+    def shape(self, found: Equilibria) -> tuple[list[Quantity], float]:
         """Depth and tensions of the shape expected.
 
         Parameters
@@ -218,6 +221,8 @@ class KeySlopes:
         Returns
         -------
         list of Quantity
+        place : float
+            Where the tension is largest, along the cable from the tow point [m].
         """
         k, gamma, system = found.expected, found.gamma, found.system
         r_f = float(found.r_f[k])
@@ -239,7 +244,7 @@ class KeySlopes:
             by_log_gamma = float(by_gamma[0]) - 2.0 * value if len(by_gamma) else np.nan
             slopes = self._total(moves[:, BY_NUMBER], by_log_gamma) + value * log_unit
             quantities.append(Quantity(name, unit_name, unit * value, unit * slopes))
-        return quantities
+        return quantities, s * self.scene.radius
 
 
 def sensitivities_of(answer: SceneAnswer) -> Sensitivities:
@@ -283,6 +288,7 @@ def sensitivities_of(answer: SceneAnswer) -> Sensitivities:
         if (folds := answer.folds) is not None:
             for name, at in zip(("jump_below", "jump_above"), folds.beside(scene.gamma), strict=True):
                 quantities += [by_key.jump(name, folds, at)] if at >= 0 else []
-        quantities += by_key.shape(found)
+        hanging, place = by_key.shape(found)
+        quantities += hanging
         quantities.append(Quantity("speed", "m/s", scene.speed, scene.speed * (by_key.log_gamma + by_key.log_speed)))
-    return Sensitivities(by_key.keys, by_key.values, by_key.deviations, tuple(quantities))
+    return Sensitivities(by_key.keys, by_key.values, by_key.deviations, tuple(quantities), place)
