@@ -199,3 +199,17 @@ def test_shell(capsys, tmp_path):
     code, out, _ = run(capsys, "scene", scene)
     assert code == 0
     assert "expected shape, +- 1 sd of cable.length to first order: depth" in out
+
+
+def test_what_is_uncertain_for_nothing_is_said(capsys, tmp_path):
+    """A key that the model used leaves out: drag in a vacuum."""
+    file = tmp_path / "scene.toml"
+    text = "[cable]\nlength = {}\nmass_per_length = 1\ndiameter = 0.01\ndrag_coefficient = '1.2 +- 0.2'\n"
+    text += "[tow]\nradius = 1\nspeed = 2\n[fluid]\nname = 'air'\n"
+    for length, shown in ((8, False), ("'8 m +- 10 cm'", True)):
+        file.write_text(text.format(length))
+        code, out, err = run(capsys, "scene", file, "--model", "vacuum")
+        assert code == 0
+        assert "cable.drag_coefficient: no part of the vacuum model, in which being uncertain does nothing" in err
+        assert ("+- 1 sd of cable.length to first order" in out) == shown
+    assert "no part of" not in run(capsys, "scene", file, "--model", "air")[2]

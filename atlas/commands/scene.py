@@ -140,7 +140,7 @@ def _run(options: argparse.Namespace) -> int:
     codes = {int(code) for code in answer.jumps.status} if answer.jumps is not None else set()
     for code in codes - {status.OK}:
         say(f"a critical speed could not be had: {status.SENTENCES[code]}")
-    return margins.judge(found, asked)
+    return margins.judge(found, answer.choice.model, asked)
 
 
 def speeds(scene: Scene, gamma: float) -> dict[str, float | None]:

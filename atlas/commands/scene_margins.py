@@ -54,9 +54,11 @@ def distance(scene: Scene, asked: tuple[float, bool]) -> float:
     return part * scene.speed
 
 
-def judge(found: Margins, asked: float | None) -> int:
-    """The exit code, and on standard error why."""
+def judge(found: Margins, model: str, asked: float | None) -> int:
+    """The exit code, and on standard error why; before it what is uncertain for nothing."""
     code = OK
+    if found.idle:
+        say(f"{', '.join(found.idle)}: no part of the {model} model, in which being uncertain does nothing")
     if found.scene.breaking_strength > 0.0 and math.isnan(found.largest_tension):
         say("the largest tension could not be computed: that it is below cable.breaking_strength is not known")
         code = FAILED
@@ -182,11 +184,12 @@ def lines_of(found: Margins, answer: SceneAnswer) -> list[str]:
         lines.append(
             f"what the uncertainty of {', '.join(scene.deviations)} does could not be computed: {found.failure}"
         )
-    elif spread:
+    elif spread and len(found.idle) < len(scene.deviations):
         k = answer.equilibria.expected
         depth = float(answer.equilibria.z_f[k]) * scene.radius
+        counted = [key for key in scene.deviations if key not in found.idle]
         lines.append(
-            f"expected shape, +- 1 sd of {', '.join(scene.deviations)} to first order: depth "
+            f"expected shape, +- 1 sd of {', '.join(counted)} to first order: depth "
             f"{_amount(depth, 'm', units, spread['depth'])}, tow tension "
             f"{_amount(answer.choice.answer.tension, 'N', units, spread['tension'])}"
         )

@@ -132,6 +132,8 @@ class Margins:
         has left over, "breaking_margin" [N]; empty where no key is uncertain, nan where not known.
     failure : str
         Why they are not known; else empty.
+    idle : tuple of str
+        Uncertain keys that have no part in the model used.
     """
 
     scene: Scene
@@ -141,6 +143,7 @@ class Margins:
     at: float
     deviations: dict[str, float]
     failure: str
+    idle: tuple[str, ...]
 
     @property
     def breaking_ratio(self) -> float:
@@ -232,6 +235,7 @@ def margins_of(answer: SceneAnswer, known: Sensitivities | None = None) -> Margi
         at=at,
         deviations=_deviations(scene, known) if scene.deviations else {},
         failure=failure,
+        idle=() if known is None else tuple(known.idle),
     )
 
 

@@ -93,6 +93,12 @@ class Sensitivities:
         with np.errstate(divide="ignore", invalid="ignore"):
             return self.values * quantity.slopes / quantity.value
 
+    @property
+    def idle(self) -> list[str]:
+        """Uncertain keys that have no part in the model used."""
+        moved = np.any([one.slopes != 0.0 for one in self.quantities], axis=0)
+        return [key for key, spread, part in zip(self.keys, self.deviations, moved, strict=True) if spread and not part]
+
     def deviation(self, slopes: Array) -> float:
         """Standard deviation to first order of what has these slopes; keys are taken to be independent.
 
