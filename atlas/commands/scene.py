@@ -43,6 +43,7 @@ def add(commands: Any) -> None:
         help="critical speeds and shapes of a towing scene in real units",
         description="Dimensionless groups, critical speeds and equilibria of a scene, a TOML file in real units, by "
         "the least model whose answers are those of the larger ones within the scene's tolerance. "
+        "It ends with the largest tension, and the nearest jumps with what they cost. "
         f"Scenes that come with the package, by name: {', '.join(shipped_scenes())}.",
     )
     parser.add_argument("file", metavar="FILE", help="a scene, - for one on standard input; see docs/scenes.md")
