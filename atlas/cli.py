@@ -1,7 +1,7 @@
 """The command line: `towatlas`, or `python -m towatlas`.
 
 Exit codes: 0 ok, 1 the computation failed, 2 usage, 3 outside the atlas, 4 no such state, 5 a file that cannot be read
-or written, is damaged, or holds something else.
+or written, is damaged, or holds something else, 6 a limit that was set is not kept.
 """
 
 import argparse
@@ -24,7 +24,8 @@ def _parser() -> argparse.ArgumentParser:
         prog="towatlas",
         description="Critical speeds of a cable towed in a circle: at what speed does it jump, and to what shape?",
         epilog="Exit codes: 0 ok, 1 computation failed, 2 usage, 3 outside the atlas, 4 no such state, 5 a file "
-        "that cannot be read, is damaged or holds something else.",
+        "that cannot be read, is damaged or holds something else, 6 a limit that was set is not kept (towatlas scene: "
+        "--margin, cable.breaking_strength).",
     )
     parser.add_argument("--version", action="version", version=f"towatlas {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")

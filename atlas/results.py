@@ -181,6 +181,26 @@ class Folds:
     def __len__(self) -> int:
         return len(self.value)
 
+    def beside(self, gamma: float) -> tuple[int, int]:
+        """Which folds in speed are next to a speed.
+
+        Parameters
+        ----------
+        gamma : float
+            [-].
+
+        Returns
+        -------
+        below, above : int
+            -1 where there is none. One at that very speed is below.
+        """
+        speeds, here = np.abs(self.gamma), abs(gamma)
+        below, above = np.flatnonzero(speeds <= here), np.flatnonzero(speeds > here)
+        return (
+            int(below[np.argmax(speeds[below])]) if len(below) else -1,
+            int(above[np.argmin(speeds[above])]) if len(above) else -1,
+        )
+
     def part(self, which: Any) -> "Folds":
         """Some of them.
 

@@ -216,15 +216,19 @@ def test_a_scene_ends_with_its_margin(capsys, tmp_path):
     (tmp_path / "deep.toml").write_text(text)
     code, out, _ = run(capsys, "scene", tmp_path / "deep.toml")
     assert code == 0
-    assert out.splitlines()[-1] == (
-        "nearest jumps (water model): 2.5292 m/s, 4.9165 kn below (-1.7 %); 2.6272 m/s, 5.1069 kn above (+2.1 %)"
+    below, above = out.splitlines()[-2:]
+    assert below.startswith(
+        "nearest jump below (water model): 2.5292 m/s, 4.9165 kn (-1.7 %); there two other shapes (1 "
+    )
+    assert above.startswith(
+        "nearest jump above (water model): 2.6272 m/s, 5.1069 kn (+2.1 %); there the expected shape ("
     )
     assert out.index("equilibria (water model)") < out.index("jumps (water model)") < out.index("group ")
     assert "vacuum model)" not in out
     compared = run(capsys, "scene", tmp_path / "deep.toml", "--compare")[1]
     assert "(vacuum model)" in compared
     assert "disagrees" in compared
-    assert "none below down to 0.0" in run(capsys, "scene", "skop-fig3", "--gamma", 0.1)[1]
+    assert "below (vacuum model): none down to 0.0" in run(capsys, "scene", "skop-fig3", "--gamma", 0.1)[1]
 
 
 def test_jumps_are_null_where_none_were_looked_for(capsys):

@@ -16,9 +16,9 @@ from towatlas.kernels import notice
 from towatlas.nomenclature import EQUILIBRIUM
 from towatlas.tables.file import default_path
 
-OK, FAILED, USAGE, OUTSIDE, NO_STATE, FILE = 0, 1, 2, 3, 4, 5
+OK, FAILED, USAGE, OUTSIDE, NO_STATE, FILE, LIMIT = 0, 1, 2, 3, 4, 5, 6
 # Of what --json prints; raised when a key changes its name or its meaning, or goes.
-JSON_SCHEMA = 3
+JSON_SCHEMA = 4
 
 
 def number(text: str) -> float:

@@ -4,9 +4,12 @@ import argparse
 import math
 from typing import Any
 
+from towatlas.commands import design_range
 from towatlas.commands.common import FAILED, NO_STATE, OK, add_patience, print_json, real, say
-from towatlas.commands.scene import add_speed, describe_speed, quantity, scene_of
+from towatlas.commands.common import speed as dimensionless_speed
+from towatlas.commands.scene import describe_speed, quantity, scene_of
 from towatlas.scene.designs import LOOKED, UNITS, Cable, Design, design
+from towatlas.scene.ranges import POINTS
 from towatlas.scene.scene import MODELS
 
 
@@ -17,7 +20,8 @@ def add(commands: Any) -> None:
         help="cable lengths that put the fish of a scene at a depth",
         description="All cable lengths that put the fish at a depth below the plane of the towing circle or at a "
         "distance from the axis, or pull with a force at the tow point, by the least model that holds for each cable "
-        "expected, with the nearest jump of each. The length in the scene is not used.",
+        "expected, with the nearest jump of each. The length in the scene is not used. For a range of speeds, "
+        "--speed 3kn:5kn, the lengths at each of some speeds, and what each of them does, kept, over the whole range.",
     )
     parser.add_argument("--scene", required=True, metavar="FILE", help="a scene, or the name of one that is shipped")
     wanted = parser.add_mutually_exclusive_group(required=True)
@@ -37,24 +41,38 @@ def add(commands: Any) -> None:
         help="longest cable searched; default 10 times the distance from the tow point to the axis at that depth",
     )
     parser.add_argument("--model", choices=MODELS, help="this one, compared with no other; default: the least")
-    add_speed(parser)
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument(
+        "--speed",
+        type=design_range.speeds,
+        metavar="V",
+        help="of the tow point, as 3kn, or a range, as 3kn:5kn; bare: m/s",
+    )
+    group.add_argument("--rpm", type=quantity("rad/s", "rpm"), metavar="N", help="turns a minute")
+    group.add_argument("--gamma", type=dimensionless_speed, metavar="GAMMA", help="Omega sqrt(R/g)")
+    parser.add_argument(
+        "--points", type=int, metavar="N", help=f"speeds of a range at which lengths are found, default {POINTS}"
+    )
+    parser.add_argument(
+        "--within",
+        metavar="TOL",
+        help="of a range of speeds: only lengths that keep what is wanted within so much of it, as 5m or 10%%",
+    )
     parser.add_argument("--json", action="store_true", help="one object instead of a table")
     add_patience(parser)
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
+    names = ("depth", "radius", "tension", "max_radius", "max_tension", "max_length")
+    limits = {name: getattr(options, name) for name in names}
+    if isinstance(options.speed, tuple):
+        return design_range.run(options, limits)
+    for name in ("points", "within"):
+        if getattr(options, name) is not None:
+            raise ValueError(f"--{name} is for a range of speeds, as --speed 3kn:5kn")
     scene = scene_of(options.scene, options)
-    found = design(
-        scene,
-        options.depth,
-        radius=options.radius,
-        tension=options.tension,
-        max_radius=options.max_radius,
-        max_tension=options.max_tension,
-        max_length=options.max_length,
-        model=options.model,
-    )
+    found = design(scene, **limits, model=options.model)
     rows = [_row(found, cable) for cable in found.chosen]
     reason = None if rows else _reason(found, options)
     if options.json:

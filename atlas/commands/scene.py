@@ -8,9 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from towatlas.commands.common import OK, add_atlas, add_patience, print_json, real, say
+from towatlas.commands import scene_margins as margins
+from towatlas.commands.common import add_atlas, add_patience, print_json, real, say
 from towatlas.commands.common import speed as dimensionless_speed
 from towatlas.commands.scene_files import check_out, write_scene
 from towatlas.kernels import status
@@ -18,8 +17,10 @@ from towatlas.scene.choice import Choice, percent
 from towatlas.scene.file import read_scene, scene_of_text, shipped_scenes
 from towatlas.scene.jumps import LOOKED, NEAR, Jumps, SceneAnswer, answer_scene
 from towatlas.scene.library import LARGEST
+from towatlas.scene.margins import margins_of
 from towatlas.scene.models import QUESTIONS, check_questions
 from towatlas.scene.scene import KNOT, MODELS, Scene
+from towatlas.scene.sensitivities import sensitivities_of
 from towatlas.tables.atlas import Atlas, open_atlas
 
 MEDIA = {"vacuum": "a vacuum", "air": "a nondense fluid", "water": "a dense fluid"}
@@ -43,6 +44,7 @@ def add(commands: Any) -> None:
         help="critical speeds and shapes of a towing scene in real units",
         description="Dimensionless groups, critical speeds and equilibria of a scene, a TOML file in real units, by "
         "the least model whose answers are those of the larger ones within the scene's tolerance. "
+        "It ends with the largest tension, and the nearest jumps with what they cost. "
         f"Scenes that come with the package, by name: {', '.join(shipped_scenes())}.",
     )
     parser.add_argument("file", metavar="FILE", help="a scene, - for one on standard input; see docs/scenes.md")
@@ -57,6 +59,15 @@ def add(commands: Any) -> None:
     )
     parser.add_argument(
         "--compare", action="store_true", help="also groups and critical speeds by the other models, and the comparison"
+    )
+    parser.add_argument(
+        "--margin",
+        type=margins.margin,
+        metavar="M",
+        help="exit code 6 if a jump is nearer to the speed than M, as 10%% or 0.5kn",
+    )
+    parser.add_argument(
+        "--sensitivities", action="store_true", help="also how jumps, depth and tensions move with each key"
     )
     add_atlas(parser)
     where = parser.add_mutually_exclusive_group()
@@ -123,19 +134,30 @@ def atlas_if_any(path: Path) -> Atlas | None:
 def _run(options: argparse.Namespace) -> int:
     if options.out:
         check_out(options.out)
+        if options.sensitivities:
+            raise ValueError("--sensitivities are a table of the text or a key of --json, and not in a file of --out")
     scene = scene_of(options.file, options)
+    asked = None if options.margin is None else margins.distance(scene, options.margin)
+    if asked is not None and "speeds" not in options.asked:
+        raise ValueError("--margin is a distance from jumps, which are not looked for without --asked speeds")
     atlas = atlas_if_any(options.atlas)
-    answer = answer_scene(scene, atlas, options.model, options.asked)
+    answer = answer_scene(scene, atlas, options.model, options.asked, options.compare)
+    slopes = sensitivities_of(answer) if options.sensitivities else None
+    found = margins_of(answer, slopes)
+    ending = margins.lines_of(found, answer)
     if options.out:
-        ending = [] if answer.folds is None else [_margin(answer)]
         write_scene(answer, options.out, ending, options.compare)
+    elif options.json:
+        print_json(object_of(answer) | margins.as_object(found, asked, slopes))
     else:
-        print_json(object_of(answer)) if options.json else print(text_of(answer, options.compare))
+        table = [*margins.slope_lines(slopes), ""] if slopes else []
+        print("\n".join([text_of(answer, options.compare), "", *table, *ending]))
     for note in answer.notes:
         say(note)
-    for code in {int(code) for code in answer.jumps.status} - {status.OK}:
+    codes = {int(code) for code in answer.jumps.status} if answer.jumps is not None else set()
+    for code in codes - {status.OK}:
         say(f"a critical speed could not be had: {status.SENTENCES[code]}")
-    return OK
+    return margins.judge(found, answer.choice.model, asked)
 
 
 def speeds(scene: Scene, gamma: float) -> dict[str, float | None]:
@@ -261,9 +283,10 @@ def object_of(answer: SceneAnswer) -> dict[str, Any]:
         "groups": _groups(scene, scene.medium),
         "groups_by_model": {model: _groups(scene, model) for model in MODELS},
         "speed": speeds(scene, scene.gamma),
-        "transitions": answer.jumps.existing,
+        # Of the vacuum: known where that is the model used, or compared.
+        "transitions": None if answer.jumps is None else answer.jumps.existing,
         "critical_speeds_model": "vacuum",
-        "critical_speeds": _jumps(scene, answer.jumps),
+        "critical_speeds": None if answer.jumps is None else _jumps(scene, answer.jumps),
         # None were looked for where speeds were not asked for.
         "jumps": None if answer.folds is None else _folds(answer),
         "jumps_looked_at": None if answer.folds is None else [speeds(scene, scene.gamma * share) for share in LOOKED],
@@ -306,34 +329,12 @@ def text_of(answer: SceneAnswer, compare: bool = False) -> str:
     lines.append("")
     if choice.model != "vacuum" and answer.folds is not None:
         lines += [*_fold_lines(answer), ""]
-    if choice.model == "vacuum" or compare:
+    if answer.jumps is not None:
         lines += [*_jump_lines(answer), ""]
     lines += _group_lines(scene, MODELS if compare else (choice.model,))
     if compare and choice.differences:
         lines += ["", *_difference_lines(choice)]
-    if answer.folds is not None:
-        lines += ["", _margin(answer)]
     return "\n".join(lines)
-
-
-def _margin(answer: SceneAnswer) -> str:
-    """How far the speed is from the jumps beside it."""
-    scene, folds = answer.scene, answer.folds
-    assert folds is not None
-    here, speeds_of = abs(scene.gamma), np.abs(folds.gamma)
-    words = []
-    for side, beside in (("below", speeds_of[speeds_of <= here]), ("above", speeds_of[speeds_of > here])):
-        if not len(beside):
-            words.append(f"none {side} down to" if side == "below" else f"none {side} up to")
-            words[-1] += f" {_cell(scene.speed_of(here * LOOKED[side == 'above']), 4)} m/s"
-            continue
-        nearest = float(beside.max() if side == "below" else beside.min())
-        speed = scene.speed_of(nearest)
-        words.append(
-            f"{_cell(speed, 5)} m/s, {_cell(speed / KNOT, 5)} kn {side} ({100.0 * (nearest / here - 1.0):+.2g} %)"
-        )
-    known = "" if folds.complete else "; not everywhere made out: others may lie between"
-    return f"nearest jumps ({answer.choice.model} model): {'; '.join(words)}{known}"
 
 
 def _group_lines(scene: Scene, models: Sequence[str]) -> list[str]:
@@ -394,6 +395,7 @@ def _fold_lines(answer: SceneAnswer) -> list[str]:
 
 def _jump_lines(answer: SceneAnswer) -> list[str]:
     scene, jumps = answer.scene, answer.jumps
+    assert jumps is not None
     if not jumps.existing:
         return ["the cable is too short for a jump: it has no critical speed (vacuum model)"]
     lines = [f"critical speeds (vacuum model), {len(jumps.n)} of {jumps.existing}"]

@@ -4,7 +4,7 @@ A model is kept if its answers are those of every larger one within the scene's 
 would not do: to a cable towed slowly in water drag adds nothing, buoyancy much.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, isnan, nan
 
@@ -99,8 +99,8 @@ class Choice:
         Of each model that was solved, in rising order; one at least.
     differences : tuple of Difference
         Between them.
-    untried : tuple of str
-        Models left out for want of keys.
+    untried : dict of str
+        Models left out, and why.
     """
 
     model: str
@@ -109,7 +109,7 @@ class Choice:
     asked: tuple[str, ...]
     answers: tuple[ModelAnswer, ...]
     differences: tuple[Difference, ...]
-    untried: tuple[str, ...]
+    untried: dict[str, str]
 
     @property
     def answer(self) -> ModelAnswer:
@@ -121,7 +121,7 @@ class Choice:
         """Why this model, with the numbers, in one sentence."""
         if self.forced:
             return f"{self.model} was asked for, and compared with no other"
-        if len(self.answers) == 1:
+        if len(self.answers) == 1 and not self.untried:
             return "towed in a vacuum there is nothing to add"
         place = [answer.model for answer in self.answers].index(self.model)
         parts = [self._objection(answer.model) for answer in self.answers[:place]]
@@ -132,7 +132,7 @@ class Choice:
                 parts[-1] += f", at most {percent(most.relative)} in the {most.quantity}"
         else:
             parts.append(f"{self.model} is the largest model that the scene has the keys for")
-        parts += [f"{name} was not tried: it needs fish.volume or fish.submerged_weight" for name in self.untried]
+        parts += [f"{name} was not tried: {why}" for name, why in self.untried.items()]
         return "; ".join(parts)
 
     def largest(self, smaller: str) -> Difference | None:
@@ -291,8 +291,17 @@ def least_model(
         raise ValueError(f"the {known[-1]} model needs {', '.join(missing)}, for which keys of the scene are missing")
     if "speeds" not in asked:
         looked = None
-    answers = [_solved(scene, name, looked, vacuum, len(known) > 1) for name in known]
-    return choose(scene, answers, asked, model is not None, untried)
+    left_out = dict.fromkeys(untried, "it needs fish.volume or fish.submerged_weight")
+    answers = []
+    for name in known:
+        try:
+            answers.append(_solved(scene, name, looked, vacuum, len(known) > 1))
+        except TooMuchWork as error:
+            # A larger model may have fewer shapes, and shorter shots.
+            if name == known[-1]:
+                raise
+            left_out[name] = f"it takes too long: {error}"
+    return choose(scene, answers, asked, model is not None, left_out)
 
 
 def choose(
@@ -300,7 +309,7 @@ def choose(
     answers: Sequence[ModelAnswer],
     asked: Sequence[str],
     forced: bool = False,
-    untried: Sequence[str] = (),
+    untried: Mapping[str, str] | None = None,
 ) -> Choice:
     """The first of some answers that agrees with all after it in what is asked.
 
@@ -313,8 +322,8 @@ def choose(
         Some of QUESTIONS.
     forced : bool
         Whether the model was named.
-    untried : sequence of str
-        Models left out for want of keys.
+    untried : mapping of str, optional
+        Models left out, and why.
 
     Returns
     -------
@@ -335,7 +344,7 @@ def choose(
         asked=tuple(asked),
         answers=tuple(answers),
         differences=tuple(differences),
-        untried=tuple(untried),
+        untried=dict(untried or {}),
     )
 
 

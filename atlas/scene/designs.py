@@ -143,7 +143,7 @@ class Design:
     @property
     def notes(self) -> list[str]:
         """What whoever asks should know: of the scene, what the model leaves out, where laws are extrapolated."""
-        notes = list(self.scene.notes)
+        notes = [*self.scene.notes, *self.scene.not_given(self.model)]
         # What larger models confirmed is known to do nothing.
         if self.forced and self.scene.density and (keys := self.scene.left_out.get(self.model)):
             notes.append(f"the {self.model} model leaves out {', '.join(keys)}")
@@ -265,7 +265,13 @@ def with_length(scene: Scene, length: float) -> Scene:
     -------
     Scene
     """
-    return replace(scene, length=length, given=scene.given | {"cable.length": f"{length:g} m"})
+    return replace(
+        scene,
+        length=length,
+        given=scene.given | {"cable.length": f"{length:g} m"},
+        values=scene.values | {"cable.length": length},
+        deviations={key: value for key, value in scene.deviations.items() if key != "cable.length"},
+    )
 
 
 def _by_model(scene: Scene, model: str, quantity: str, value: float, longest: float) -> Design:

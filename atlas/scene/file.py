@@ -140,25 +140,21 @@ def make_scene(table: dict[str, Any], source: str = "") -> Scene:
     ValueError
         As `read_scene`, without the name of the file.
     """
-    given, notes = parse_scene(table)
+    given, deviations, notes = parse_scene(table)
+    if table.get("fish") == {}:
+        raise ValueError("fish.mass is missing; without a fish leave out the section [fish]")
     cable_type = None
     if "cable.type" in given:
         cable_type = find_type(given["cable.type"], given.get("cable.library"), Path(source).parent)
     elif "cable.library" in given:
         raise ValueError("cable.type is missing: which of the cables of cable.library")
-    values = given | (cable_type.beside(given) if cable_type else {})
-    fish = any(key.startswith("fish.") for key in given) or "fish" in table
-    density = derived.fluid_density(values)
-    gravity = values.get("gravity", STANDARD_GRAVITY)
-    radius, speed = derived.circle(values, gravity)
-    if density:
-        for key in ("cable.diameter", "cable.drag_coefficient"):
-            if key not in values:
-                raise ValueError(f"{key} is missing: in a fluid the cable needs it for its drag")
-    mass, displaced = derived.cable_mass(values, density, gravity)
-    fish_mass, fish_displaced = derived.fish_mass(values, density, gravity) if fish else (0.0, 0.0)
-    side, sine = derived.side_force(values, density)
-    if density and fish_mass and "fish.drag_coefficient" not in values:
+    added = cable_type.beside(given) if cable_type else {}
+    values = given | added
+    if cable_type:
+        deviations = cable_type.scatter(added) | deviations
+    numbers = scene_numbers(values)
+    density = numbers["density"]
+    if density and numbers["fish_mass"] and "fish.drag_coefficient" not in values:
         notes.append("fish.drag_coefficient is not given: the fish has no drag; 0 says so without this line")
     left_out = derived.left_out(given, given.get("cable.type", ""))
     if not density and left_out["vacuum"]:
@@ -166,28 +162,15 @@ def make_scene(table: dict[str, Any], source: str = "") -> Scene:
     scene = Scene(
         title=values.get("title", ""),
         source=source,
-        length=values.get("cable.length", nan),
-        mass_per_length=mass,
-        displaced_per_length=displaced,
-        diameter=values.get("cable.diameter", nan),
-        drag_coefficient=values.get("cable.drag_coefficient", nan),
-        tangential_drag_coefficient=derived.tangential_drag(values),
-        side_force_coefficient=side,
-        side_force_sine=sine,
-        fish_mass=fish_mass,
-        fish_displaced=fish_displaced,
-        fish_added_mass=derived.fish_added_mass(values, fish_displaced),
-        fish_drag_area=derived.fish_drag_area(values),
-        radius=radius,
-        speed=speed,
+        **numbers,
         turn=values.get("tow.turn", "starboard"),
-        density=density,
-        gravity=gravity,
         tolerance=values.get("tolerance", 0.01),
         cable_type=cable_type,
         notes=tuple(notes),
         left_out=left_out,
         given=_written(table),
+        values=values,
+        deviations=deviations,
     )
     if scene.medium == "water" and scene.fish_displaced != scene.fish_displaced:
         raise ValueError(
@@ -196,10 +179,59 @@ def make_scene(table: dict[str, Any], source: str = "") -> Scene:
     return scene
 
 
+def scene_numbers(values: dict[str, Any]) -> dict[str, float]:
+    """The numbers of a scene, as fields of `Scene`.
+
+    Parameters
+    ----------
+    values : dict
+        In SI, by "section.key", those of a type of cable among them.
+
+    Returns
+    -------
+    dict of float
+
+    Raises
+    ------
+    ValueError
+        For keys that are missing, or contradict each other.
+    """
+    density = derived.fluid_density(values)
+    gravity = values.get("gravity", STANDARD_GRAVITY)
+    radius, speed = derived.circle(values, gravity)
+    if density:
+        for key in ("cable.diameter", "cable.drag_coefficient"):
+            if key not in values:
+                raise ValueError(f"{key} is missing: in a fluid the cable needs it for its drag")
+    mass, displaced = derived.cable_mass(values, density, gravity)
+    fish = any(key.startswith("fish.") for key in values)
+    fish_mass, fish_displaced = derived.fish_mass(values, density, gravity) if fish else (0.0, 0.0)
+    side, sine = derived.side_force(values, density)
+    return {
+        "length": values.get("cable.length", nan),
+        "mass_per_length": mass,
+        "displaced_per_length": displaced,
+        "diameter": values.get("cable.diameter", nan),
+        "drag_coefficient": values.get("cable.drag_coefficient", nan),
+        "tangential_drag_coefficient": derived.tangential_drag(values),
+        "side_force_coefficient": side,
+        "side_force_sine": sine,
+        "fish_mass": fish_mass,
+        "fish_displaced": fish_displaced,
+        "fish_added_mass": derived.fish_added_mass(values, fish_displaced),
+        "fish_drag_area": derived.fish_drag_area(values),
+        "radius": radius,
+        "speed": speed,
+        "density": density,
+        "gravity": gravity,
+        "breaking_strength": values.get("cable.breaking_strength", nan),
+    }
+
+
 def _written(table: dict[str, Any]) -> dict[str, str]:
-    """Length, radius and speed as they are written, a number without a unit with the one it is taken for."""
+    """Length, radius, speed and forces as they are written, a number without a unit with the one it is taken for."""
     texts = {}
-    for name in ("cable.length", "tow.radius", *SPEED_KEYS):
+    for name in ("cable.length", "cable.breaking_strength", "fish.submerged_weight", "tow.radius", *SPEED_KEYS):
         section, key = name.split(".")
         if key in table.get(section, {}):
             value = table[section][key]

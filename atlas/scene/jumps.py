@@ -80,14 +80,14 @@ class Jumps:
 
 @dataclass(frozen=True)
 class SceneAnswer:
-    """A scene's critical speeds in a vacuum, the model chosen for it and what that one answers.
+    """A scene, the model chosen for it and what that one answers.
 
     Attributes
     ----------
     scene : Scene
         What was asked about.
-    jumps : Jumps
-        By the vacuum model, dimensionless.
+    jumps : Jumps or None
+        Critical speeds by the vacuum model, dimensionless; None where another model is used and that one not compared.
     choice : Choice
         The model used and why, with its answers in SI.
     folds : Folds or None
@@ -97,7 +97,7 @@ class SceneAnswer:
     """
 
     scene: Scene
-    jumps: Jumps
+    jumps: Jumps | None
     choice: Choice
     folds: Folds | None
     angles: list[Angles | None]
@@ -105,7 +105,7 @@ class SceneAnswer:
     @property
     def notes(self) -> list[str]:
         """What whoever asks should know: of the scene, what no model looked at, where laws are extrapolated."""
-        notes = list(self.scene.notes)
+        notes = [*self.scene.notes, *self.scene.not_given(self.choice.model)]
         largest = self.choice.answers[-1].model
         # What a larger model confirmed is known to do nothing.
         if self.scene.density and (keys := self.scene.left_out.get(largest)):
@@ -208,9 +208,13 @@ def _block(n: NDArray[np.int64], *, lam: float, w_f: float, atlas: Atlas | None)
 
 
 def answer_scene(
-    scene: Scene, atlas: Atlas | None = None, model: str | None = None, asked: Sequence[str] = QUESTIONS
+    scene: Scene,
+    atlas: Atlas | None = None,
+    model: str | None = None,
+    asked: Sequence[str] = QUESTIONS,
+    compare: bool = False,
 ) -> SceneAnswer:
-    """Critical speeds and equilibria of a scene, by the least model that answers what is asked.
+    """Jumps and equilibria of a scene, by the least model that answers what is asked.
 
     Parameters
     ----------
@@ -222,6 +226,8 @@ def answer_scene(
         The model to use whatever the others say, one of "vacuum", "air", "water"; by default the least.
     asked : sequence of str
         What it has to answer, some of "nodes", "position", "tension", "speeds".
+    compare : bool
+        Whether critical speeds by the vacuum model are wanted whatever the model used.
 
     Returns
     -------
@@ -244,14 +250,17 @@ def answer_scene(
     if not np.isfinite(scene.system("vacuum").lam):
         raise ValueError(f"{scene.source}: cable.length is missing; a design finds one: towatlas design --help")
     with patient_with(scene):
-        return _answer(scene, atlas, model, asked)
+        return _answer(scene, atlas, model, asked, compare)
 
 
-def _answer(scene: Scene, atlas: Atlas | None, model: str | None, asked: Sequence[str]) -> SceneAnswer:
-    groups, gamma = scene.system("vacuum"), scene.gamma
-    jumps = critical_speeds(lam=groups.lam, w_f=groups.w_f, gamma=abs(gamma), atlas=atlas)
+def _answer(scene: Scene, atlas: Atlas | None, model: str | None, asked: Sequence[str], compare: bool) -> SceneAnswer:
+    gamma = scene.gamma
     looked = (gamma * LOOKED[0], gamma * LOOKED[1])
     choice = least_model(scene, model, asked, looked)
+    jumps = None
+    if compare or choice.model == "vacuum":
+        groups = scene.system("vacuum")
+        jumps = critical_speeds(lam=groups.lam, w_f=groups.w_f, gamma=abs(gamma), atlas=atlas)
     folds = choice.answer.folds
     found = choice.answer.equilibria
     return SceneAnswer(

@@ -5,10 +5,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from towatlas.checks import short
-from towatlas.scene.units import parse_quantity
+from towatlas.scene.units import parse_quantity, parse_uncertain
 
 TEXT = "text"
 SIDES = ("starboard", "port")
+# Deviations above this share of a value are asked about.
+LARGE = 0.5
 ON = ("d", "pi d")
 # A key's SI unit, or the words that it may be.
 Keys = Mapping[str, str | tuple[str, ...]]
@@ -24,6 +26,7 @@ CABLE: Keys = {
     "side_force_coefficient": "",
     "side_force_sine": "",
     "kites": SIDES,
+    "breaking_strength": "N",
 }
 # Every key of a scene.
 KEYS: dict[str, Keys] = {
@@ -96,7 +99,7 @@ _USUAL = {
 }
 
 
-def parse_scene(table: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
+def parse_scene(table: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, float], list[str]]:
     """The values of a scene; every key is known, has the right unit and is in range.
 
     Parameters
@@ -108,8 +111,10 @@ def parse_scene(table: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
     -------
     values : dict
         In SI, by "section.key".
+    deviations : dict of float
+        Standard deviations of those that have one, > 0.
     questions : list of str
-        About values of unusual size.
+        About values of unusual size, and deviations as large as their values.
 
     Raises
     ------
@@ -126,13 +131,26 @@ def parse_scene(table: Mapping[str, Any]) -> tuple[dict[str, Any], list[str]]:
             raise ValueError(f"{name} = {short(value)} is a section; write [{name}] and its keys below")
         else:
             flat[name] = value
-    values = {}
+    values, deviations = {}, {}
     for name, value in flat.items():
         section, _, key = name.rpartition(".")
         if key not in KEYS[section]:
             raise ValueError(f"key {name} is unknown{_close(key, KEYS[section], section)}")
-        values[name] = parse_value(name, value, KEYS[section][key])
-    return values, [text for name, value in flat.items() if (text := _question(name, value, values[name]))]
+        unit = KEYS[section][key]
+        if isinstance(unit, str) and unit != TEXT and name != "tolerance":
+            values[name], deviation = parse_uncertain(name, value, unit, **_context(section, key))
+            _check_range(name, value, values[name])
+            if deviation:
+                deviations[name] = deviation
+        else:
+            values[name] = parse_value(name, value, unit)
+    questions = [text for name, value in flat.items() if (text := _question(name, value, values[name]))]
+    questions += [
+        f"{name} = {short(flat[name])} is hardly known: what follows to first order from its deviation says little"
+        for name, deviation in deviations.items()
+        if deviation > LARGE * abs(values[name])
+    ]
+    return values, deviations, questions
 
 
 def parse_value(name: str, value: Any, unit: str | tuple[str, ...]) -> Any:
@@ -167,11 +185,23 @@ def parse_value(name: str, value: Any, unit: str | tuple[str, ...]) -> Any:
         if not isinstance(value, str):
             raise ValueError(f"{name} = {short(value)} is not a text")
         return value
-    twin = f"{section}.{_TWINS[key]}" if key in _TWINS else None
-    number = parse_quantity(name, value, unit, bare="rpm" if key == "rpm" else None, twin=twin)
-    if key not in _SIGNED and (number < 0.0 or (number == 0.0 and key not in _MAY_BE_ZERO)):
-        raise ValueError(f"{name} = {short(value)} is {'negative' if number < 0.0 else 'zero'}")
+    number = parse_quantity(name, value, unit, **_context(section, key))
+    _check_range(name, value, number)
     return number
+
+
+def _context(section: str, key: str) -> dict[str, str | None]:
+    """What `parse_quantity` should know of a key."""
+    return {
+        "bare": "rpm" if key == "rpm" else None,
+        "twin": f"{section}.{_TWINS[key]}" if key in _TWINS else None,
+    }
+
+
+def _check_range(name: str, written: Any, number: float) -> None:
+    key = name.rpartition(".")[2]
+    if key not in _SIGNED and (number < 0.0 or (number == 0.0 and key not in _MAY_BE_ZERO)):
+        raise ValueError(f"{name} = {short(written)} is {'negative' if number < 0.0 else 'zero'}")
 
 
 def _question(name: str, written: Any, value: Any) -> str:

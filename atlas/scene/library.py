@@ -10,9 +10,13 @@ from math import degrees, pi
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from towatlas.scene.keys import CABLE, TEXT, Keys, parse_value
 
 STANDARD_GRAVITY = 9.80665
+# At which the law of a side force is averaged.
+ANGLES = 101
 # A file is a page: what is longer is something else.
 LARGEST = 10**6  # bytes
 # Keys of a type: those of a cable, and how well and where they are known.
@@ -90,6 +94,28 @@ class CableType:
                 "or cable.submerged_weight_per_length, too"
             )
         return added
+
+    def scatter(self, added: dict[str, Any]) -> dict[str, float]:
+        """Standard deviations of what it adds to the keys of a scene.
+
+        Parameters
+        ----------
+        added : dict
+            From `beside`.
+
+        Returns
+        -------
+        dict of float
+            By "cable.key". That of the side force, which is one of C_s, is turned into one of the coefficient a by the
+            root mean square of C_s / a over the angles at which it was measured.
+        """
+        known = {f"cable.{name}": value for name, value in self.deviations.items() if value}
+        side = known.pop("cable.side_force", 0.0)
+        if side and self.angles_deg is not None:
+            sine = np.sin(np.radians(np.linspace(*self.angles_deg, ANGLES)))
+            shape = sine / (1.0 + np.square(sine / added.get("cable.side_force_sine", np.inf)))
+            known["cable.side_force_coefficient"] = float(side / np.sqrt(np.mean(np.square(shape))))
+        return {key: value for key, value in known.items() if key in added}
 
 
 def read_toml(file: Path | Traversable, name: str, what: str, absent: Callable[[], str]) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from math import inf, pi, sqrt
+from math import inf, nan, pi, sqrt
 from typing import Any
 
 from towatlas.checks import check_finite, check_one
@@ -65,6 +65,8 @@ class Scene:
         [m/s^2], > 0.
     tolerance : float
         Within which models agree, relative [-], > 0.
+    breaking_strength : float
+        Of the cable [N], > 0; nan if not given.
     cable_type : CableType or None
         Where keys of the cable are from.
     notes : tuple of str
@@ -72,7 +74,11 @@ class Scene:
     left_out : dict of tuple of str
         What is given and not used, by model.
     given : dict of str
-        Length, radius and speed as the user wrote them, by "section.key"; empty by default.
+        Length, radius, speed and forces as the user wrote them, by "section.key"; empty by default.
+    values : dict
+        All keys with a type of cable's in SI, by "section.key".
+    deviations : dict of float
+        Standard deviations of those that are uncertain, in SI.
     """
 
     title: str
@@ -95,10 +101,13 @@ class Scene:
     density: float
     gravity: float
     tolerance: float
+    breaking_strength: float = nan
     cable_type: CableType | None = None
     notes: tuple[str, ...] = field(default=(), compare=False, repr=False)
     left_out: dict[str, tuple[str, ...]] = field(default_factory=dict, compare=False, repr=False)
     given: dict[str, str] = field(default_factory=dict, compare=False, repr=False)
+    values: dict[str, Any] = field(default_factory=dict, compare=False, repr=False)
+    deviations: dict[str, float] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def gamma(self) -> float:
@@ -192,6 +201,23 @@ class Scene:
             b_s=self.side_force_sine if side else inf,
         )
 
+    def not_given(self, model: str) -> list[str]:
+        """What a model would use and the scene does not give, in sentences.
+
+        Parameters
+        ----------
+        model : str
+            One of MODELS.
+
+        Returns
+        -------
+        list of str
+        """
+        key = "cable.tangential_drag_coefficient"
+        if model != "water" or not self.density or key in self.values:
+            return []
+        return [f"{key} is not given: the flow along the cable has no drag; 0 says so without this line"]
+
     def speed_of(self, gamma: Any) -> Any:
         """Speed of the tow point at a dimensionless one, Eq. (13b).
 
@@ -253,8 +279,14 @@ class Scene:
             raise ValueError(f"give exactly one of speed, rotation_rate and gamma, not {len(checked)}")
         ((name, value),) = checked.items()
         speeds = {"speed": value, "rotation_rate": value * self.radius, "gamma": self.speed_of(value)}
-        texts = {key: text for key, text in self.given.items() if key not in SPEED_KEYS}
-        return replace(self, speed=speeds[name], given=texts)
+        return replace(
+            self,
+            speed=speeds[name],
+            given=_no_speed(self.given),
+            # A circle that followed from its speed stays.
+            values=_no_speed(self.values) | {"tow.radius": self.radius, f"tow.{name}": value},
+            deviations=_no_speed(self.deviations),
+        )
 
     def described(self, length: str | None = None, lam: float | None = None) -> str:
         """What makes the work that a scene is, in the units of the user.
@@ -276,6 +308,10 @@ class Scene:
         length = length or f"cable.length = {given.get('cable.length', f'{self.length:g} m')}"
         lam = self.length / self.radius if lam is None else lam
         return f"{length} with tow.radius = {radius} makes lam = {lam:,.6g}, {speed} makes gamma = {self.gamma:.6g}"
+
+
+def _no_speed(kept: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in kept.items() if key not in SPEED_KEYS}
 
 
 @contextmanager

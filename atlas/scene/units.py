@@ -11,6 +11,10 @@ from towatlas.checks import short
 # Number, unit. The number may be a fraction, "11/16", or a mixed one, "1 1/2".
 _DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"\s*([+-]?)\s*(?:(\d+)\s+(\d+)/(\d+)|({_DECIMAL})(?:\s*/\s*({_DECIMAL}))?)\s*(.*?)\s*")
+# What stands between a value and its standard deviation.
+_PLUS_MINUS = re.compile(r"\+/?-|±")
+_UNCERTAIN = 'write them as "1.2 +- 0.2", "12 mm +- 0.5 mm" or "12 mm +- 10 %"'
+_BRACKETED = re.compile(r"\s*\((.*)\)(.*)")
 # A quantity is a few words. Longer ones, and exponents beyond those of a float, would be worked out to the last digit.
 _LONGEST = 100  # characters
 _EXPONENT = 400
@@ -118,8 +122,85 @@ def parse_quantity(name: str, value: Any, unit: str, bare: str | None = None, tw
     return _convert(name, value, number, symbol, unit, twin)
 
 
+def parse_uncertain(
+    name: str, value: Any, unit: str, bare: str | None = None, twin: str | None = None
+) -> tuple[float, float]:
+    """A quantity in SI and its standard deviation.
+
+    Parameters
+    ----------
+    name, value, unit, bare, twin
+        As of `parse_quantity`; the value may be a text like "12 mm +- 0.5 mm", "(12 +- 0.5) mm" or "1.2 +- 10 %", a
+        share of the value. Between them stands +-, +/- or the sign of it.
+
+    Returns
+    -------
+    value, deviation : float
+        In `unit`; the deviation is >= 0, and 0 if not given.
+
+    Raises
+    ------
+    ValueError
+        As `parse_quantity`, and for what is no value and its deviation.
+
+    Examples
+    --------
+    >>> parse_uncertain("drag_coefficient", "1.2 +- 0.2", "")
+    (1.2, 0.2)
+    """
+    if not isinstance(value, str) or len(value) > _LONGEST or _PLUS_MINUS.search(value) is None:
+        return parse_quantity(name, value, unit, bare, twin), 0.0
+    bracketed = _BRACKETED.fullmatch(value)
+    inside, common = bracketed.groups() if bracketed else (value, "")
+    parts = [part.strip() for part in _PLUS_MINUS.split(inside)]
+    if len(parts) != 2 or not all(parts):
+        raise ValueError(f"{name} = {short(value)} is no value with its standard deviation; {_UNCERTAIN}")
+    mean, spread = (f"{part} {common}".strip() for part in parts)
+    about = f"the deviation of {name}"
+    if spread.endswith("%") and "%" not in mean:
+        number = parse_quantity(name, mean, unit, bare, twin)
+        deviation = parse_quantity(about, spread, "") * abs(number)
+    else:
+        bare_mean, united = _QUANTITY.fullmatch(mean), _QUANTITY.fullmatch(spread)
+        if bare_mean and united and not bare_mean[7]:
+            mean = f"{mean} {united[7]}".strip()
+        if unit and united and not united[7]:
+            raise ValueError(f"{name} = {short(value)}: {spread} has no unit; {_UNCERTAIN}")
+        number = parse_quantity(name, mean, unit, bare, twin)
+        deviation = parse_quantity(about, spread, unit, bare, twin)
+    if deviation < 0.0:
+        raise ValueError(f"{about} = {short(spread)} is negative: what stands behind +- is a standard deviation")
+    return number, deviation
+
+
+def written_unit(text: str) -> str:
+    """The unit in which a quantity is written.
+
+    Parameters
+    ----------
+    text : str
+        As of `parse_uncertain`.
+
+    Returns
+    -------
+    str
+        Empty for a pure number.
+
+    Examples
+    --------
+    >>> written_unit("4 kn +- 0.2 kn"), written_unit("(12 +- 0.5) mm")
+    ('kn', 'mm')
+    """
+    bracketed = _BRACKETED.fullmatch(text)
+    parts = [bracketed[2]] if bracketed else _PLUS_MINUS.split(text)
+    units = (match[7] if (match := _QUANTITY.fullmatch(part)) else part.strip() for part in parts)
+    return next((unit for unit in units if unit), "")
+
+
 def _split(name: str, text: str, unit: str) -> tuple[float, str]:
     parts = _QUANTITY.fullmatch(text) if len(text) <= _LONGEST else None
+    if _PLUS_MINUS.search(text[:_LONGEST]):
+        raise ValueError(f"{name} = {short(text)} takes no standard deviation; what is measured of a scene does")
     if parts is None:
         raise ValueError(
             f"{name} = {short(text)} is not {_KINDS[unit]}; write a number and its unit, as {_sample(unit)}"
