@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from towatlas.effort import TooMuchWork, patience
     from towatlas.limits import excess_length, massless_cable, threshold_length
-    from towatlas.results import CriticalStates, Cusps, DragFolds, Equilibria, FishPositions, Folds
+    from towatlas.results import CriticalStates, Cusps, DragFolds, Equilibria, FishPositions, Folds, Stability
     from towatlas.scene.designs import design
     from towatlas.scene.file import read_scene
     from towatlas.scene.jumps import answer_scene
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from towatlas.solve.folds import folds
     from towatlas.solve.many import equilibria_many
     from towatlas.solve.shapes import shape, shape_of
+    from towatlas.solve.stability import stability, stability_of
     from towatlas.system import System
     from towatlas.tables.atlas import Atlas, open_atlas
     from towatlas.tables.seal import AtlasFileError
@@ -35,6 +36,7 @@ __all__ = [
     "Equilibria",
     "FishPositions",
     "Folds",
+    "Stability",
     "System",
     "TooMuchWork",
     "answer_scene",
@@ -52,6 +54,8 @@ __all__ = [
     "shape_of",
     "solve_critical",
     "solve_drag_folds",
+    "stability",
+    "stability_of",
     "sweep",
     "threshold_length",
 ]
@@ -60,7 +64,7 @@ __all__ = [
 _HOMES = {
     "effort": ("TooMuchWork", "patience"),
     "limits": ("excess_length", "massless_cable", "threshold_length"),
-    "results": ("CriticalStates", "Cusps", "DragFolds", "Equilibria", "FishPositions", "Folds"),
+    "results": ("CriticalStates", "Cusps", "DragFolds", "Equilibria", "FishPositions", "Folds", "Stability"),
     "scene.designs": ("design",),
     "scene.file": ("read_scene",),
     "scene.jumps": ("answer_scene",),
@@ -72,6 +76,7 @@ _HOMES = {
     "solve.folds": ("folds",),
     "solve.many": ("equilibria_many",),
     "solve.shapes": ("shape", "shape_of"),
+    "solve.stability": ("stability", "stability_of"),
     "system": ("System",),
     "tables.atlas": ("Atlas", "open_atlas"),
     "tables.seal": ("AtlasFileError",),

@@ -133,6 +133,66 @@ class Equilibria:
 
 
 @dataclass(frozen=True)
+class Stability:
+    """Growth rates of small motions about the equilibria of one cable at one speed, in the order of these.
+
+    Times are in sqrt(R/g). A motion grows as exp(growth t) and turns by frequency t.
+
+    Attributes
+    ----------
+    equilibria : Equilibria
+        The shapes.
+    growth, frequency : ndarray, shape (equilibria,)
+        Of the leading eigenvalue, that which grows most, or damps least, over sqrt(g/R) [-]; of several with the same
+        growth the slowest. Without drag the growth of what does not grow is 0. nan where status says why, and where
+        all is damped so strongly that none was found.
+    unstable : ndarray of int, shape (equilibria,)
+        Number of eigenvalues that grow by more than their error, >= 0, conjugate ones counted each; -1 if not counted.
+    index : ndarray of int, shape (equilibria,)
+        Without drag the number of directions in which the energy falls, >= 0; -1 with drag.
+    kind : ndarray of str, shape (equilibria,)
+        "stable"; "divergence" where the leading eigenvalue is real, "flutter" where it is one of a pair, "weak" where
+        it is below 0.01 gamma; "unknown" where not counted.
+    error : ndarray, shape (equilibria,)
+        Estimated absolute error of growth and frequency over sqrt(g/R) [-], > 0.
+    status : ndarray of int8, shape (equilibria,)
+        Codes of `towatlas.kernels.status`; `sentence` puts them in words.
+    eigenvalues : tuple of ndarray of complex, shape (equilibria,)
+        Of each shape those that were solved for, with frequencies >= 0, over sqrt(g/R) [-], the leading one first.
+    looked_at : str
+        Which were looked for.
+    """
+
+    equilibria: Equilibria
+    growth: Array
+    frequency: Array
+    unstable: Integers
+    index: Integers
+    kind: NDArray[np.str_]
+    error: Array
+    status: NDArray[np.int8]
+    eigenvalues: tuple[NDArray[np.complex128], ...]
+    looked_at: str
+
+    def __len__(self) -> int:
+        return len(self.growth)
+
+    def sentence(self, index: int) -> str:
+        """The status of one shape in words.
+
+        Parameters
+        ----------
+        index : int
+            Which shape.
+
+        Returns
+        -------
+        str
+        """
+        return codes.SENTENCES[int(self.status[index])]
+
+
+@dataclass(frozen=True)
 class Folds:
     """Folds of one cable as one of its numbers moves, in rising order of it: at each two shapes meet.
 
