@@ -19,6 +19,8 @@ from towatlas.solve.motion import Array, Complex, Integers, Motion
 
 # Gauss nodes a panel beyond the degree.
 NODES = 6
+# Rounds of Newton to their places.
+NEWTON = 12
 # By how much the angle of the cable, the phase of its waves and the logarithm of its tension may change in a panel.
 PANEL = 5.0
 DEGREE = 8
@@ -125,7 +127,8 @@ def matrices(motion: Motion, degree: int, panel: float) -> tuple[Array, Array, A
     panels = list(_panels(motion, degree, panel))
     size = panels[0].end.shape[1]
     unknowns = size * len(panels)
-    mass, pull = motion.fish[0], motion.fish[1] * PULL
+    # A bare tip is left out of the steps: so much cable.
+    mass, pull = motion.fish[0] + motion.start[0] * motion.start[1], motion.fish[1] * PULL
     # What is below a panel moves as one; the fish is the last of it. From the fish up.
     below = [mass * np.eye(3), 2.0 * mass * S + pull, (mass * S + pull) @ S]
     all_of = [np.zeros((unknowns, unknowns)) for _ in below]
@@ -159,25 +162,19 @@ def _panels(motion: Motion, degree: int, panel: float) -> Iterator[_Panel]:
     """From the fish up."""
     of_step = _panel_of_step(motion, panel)
     share, weights, integrals = _rule(degree + NODES)
+    # From the upper end of the panel down.
+    polynomials = legendre.legvander(1.0 - 2.0 * share, degree)[:, None, :]
     for j in range(of_step[-1] + 1):
         steps = np.flatnonzero(of_step == j)
-        borders = np.concatenate([[0.0], np.cumsum(motion.sizes[steps])])
-        tau = borders[-1] * share
-        k = np.clip(np.searchsorted(borders, tau, side="right") - 1, 0, len(steps) - 1)
-        part = (tau - borders[k]) / motion.sizes[steps[k]]
-        powers = part[:, None] ** np.arange(TERMS)
-        values = np.einsum("qro,qo->qr", motion.series[steps[k]], powers)
-        tension, weight = values[:, 0], borders[-1] * weights
-        length = weight * tension
+        k, part, whole = _places(motion, steps, share)
+        values = np.einsum("qro,qo->qr", motion.series[k], part[:, None] ** np.arange(TERMS))
         P, TA, EP = (values[:, 1 + 9 * i : 10 + 9 * i].reshape(-1, 3, 3) for i in range(3))
-        # From the upper end of the panel down.
-        above = integrals * borders[-1]
-        depth = above @ tension
-        slope = _slopes(P, 2.0 * depth / length.sum() - 1.0, degree)
-        drag, own = weight[:, None, None] * TA, length[:, None, None]
+        length, tension = whole * weights, values[:, 0]
+        slope = _slopes(P, polynomials)
+        drag, own = (length / tension)[:, None, None] * TA, length[:, None, None]
         yield _Panel(
             slope,
-            np.einsum("qj,jid->qid", above * tension, slope),
+            np.einsum("qj,jid->qid", whole * integrals, slope),
             np.einsum("q,qid->id", length, slope),
             length,
             tension,
@@ -186,6 +183,25 @@ def _panels(motion: Motion, degree: int, panel: float) -> Iterator[_Panel]:
             (own * S + drag) @ S,
             own * EP,
         )
+
+
+def _places(motion: Motion, steps: Integers, share: Array) -> tuple[Integers, Array, float]:
+    """Where shares of the length of some steps are: number and part of the step; and that length."""
+    lengths = motion.series[:, 0] / np.arange(1, TERMS + 1) * motion.sizes[:, None]
+    borders = np.concatenate([[0.0], np.cumsum(lengths[steps].sum(1))])
+    target = borders[-1] * share
+    k = np.clip(np.searchsorted(borders, target, side="right") - 1, 0, len(steps) - 1)
+    target, k = target - borders[k], steps[k]
+    powers = np.arange(TERMS)
+    low, high = np.zeros(len(share)), np.ones(len(share))
+    part = np.full(len(share), 0.5)
+    for _ in range(NEWTON):
+        all_of = part[:, None] ** powers
+        miss = (lengths[k] * all_of).sum(1) * part - target
+        low, high = np.where(miss < 0.0, part, low), np.where(miss < 0.0, high, part)
+        trial = part - miss / ((motion.series[k, 0] * all_of).sum(1) * motion.sizes[k])
+        part = np.where((trial >= low) & (trial <= high), trial, 0.5 * (low + high))
+    return k, part, float(borders[-1])
 
 
 def _panel_of_step(motion: Motion, panel: float) -> Integers:
@@ -213,13 +229,12 @@ def _rule(nodes: int) -> tuple[Array, Array, Array]:
     return 0.5 * (x + 1.0), 0.5 * w, out
 
 
-def _slopes(P: Array, place: Array, degree: int) -> Array:
-    """Two unit vectors across the cable, times polynomials of the place in the panel: shape (nodes, 3, functions)."""
+def _slopes(P: Array, polynomials: Array) -> Array:
+    """Two unit vectors across the cable, times polynomials: shape (nodes, 3, functions)."""
     first, second = np.linalg.eigh(P[len(P) // 2])[1][:, [2, 1]].T
     n = P @ first
     n /= np.linalg.norm(n, axis=-1, keepdims=True)
     b = P @ second
     b -= n * (n * b).sum(-1, keepdims=True)
     b /= np.linalg.norm(b, axis=-1, keepdims=True)
-    polynomials = legendre.legvander(place, degree)[:, None, :]
     return np.concatenate([n[..., None] * polynomials, b[..., None] * polynomials], axis=-1)

@@ -213,9 +213,8 @@ def count_growing(motion: Motion, known: Complex) -> int | None:
         arc = R * np.exp(0.5j * np.pi * np.minimum(t, 1.0))
         return np.where(t <= 1.0, arc, 1j * R * np.maximum(2.0 - t, 0.0))
 
-    def others(t: Array) -> tuple[Complex, Array]:
+    def others(sigma: Complex) -> tuple[Complex, Array]:
         """D over the factors of the zeros that are known: its phase, and the logarithm of its size."""
-        sigma = at(t)
         values, logs = motion.evans(sigma)
         for zero in zeros:
             away = sigma - zero
@@ -223,10 +222,12 @@ def count_growing(motion: Motion, known: Complex) -> int | None:
         size = np.abs(values)
         return values / size, logs + np.log(size)
 
-    each = POINTS + len(zeros) // 2
+    # What grows by a factor of e from one side of the disc to the other turns by a radian on its way around.
+    growth = float(np.ptp(others(np.array([-R, 0.0, R]))[1]))
+    each = POINTS + len(zeros) // 2 + int(min(growth / LARGEST_CHANGE, MOST_POINTS))
     t = np.concatenate([np.linspace(0.0, 1.0, each, endpoint=False), np.linspace(1.0, 2.0, each)])
     ends = np.stack([t[:-1], t[1:]])
-    phase, size = others(t)
+    phase, size = others(at(t))
     phases, sizes = np.stack([phase[:-1], phase[1:]]), np.stack([size[:-1], size[1:]])
     total, points = 0.0, len(t)
     while ends.size:
@@ -234,7 +235,7 @@ def count_growing(motion: Motion, known: Complex) -> int | None:
         if points > MOST_POINTS:
             return None
         middle = ends.mean(axis=0)
-        phase, size = others(middle)
+        phase, size = others(at(middle))
         turns = np.angle(np.stack([phase / phases[0], phases[1] / phase]))
         # Two zeros close beside the contour turn the phase by all but nothing between two points; the size, of one of
         # the two halves at least, tells.
