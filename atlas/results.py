@@ -193,6 +193,70 @@ class Stability:
 
 
 @dataclass(frozen=True)
+class Window:
+    """A range of speeds in which the shape of one branch does not last.
+
+    Attributes
+    ----------
+    branch : str
+        Name of the shape where it grows most, as of `Equilibria`.
+    nodes : int
+        Its nodes [-], >= 0.
+    low, high : float
+        Speeds Omega sqrt(R/g) [-], > 0.
+    low_kind, high_kind : str
+        What is there: "fold", where the branch begins or ends, "hopf", "krein", where two oscillations meet without
+        drag, "range", the end of what was looked at, or "unknown", where growth could not be counted.
+    low_frequency, high_frequency : float
+        Of the leading eigenvalue there, over sqrt(g/R) [-], >= 0.
+    growth : float
+        The largest, over sqrt(g/R) [-], > 0.
+    gamma : float
+        Where it is [-].
+    weak : bool
+        Whether it is below 0.01 gamma.
+    """
+
+    branch: str
+    nodes: int
+    low: float
+    high: float
+    low_kind: str
+    high_kind: str
+    low_frequency: float
+    high_frequency: float
+    growth: float
+    gamma: float
+    weak: bool
+
+
+@dataclass(frozen=True)
+class Flutter:
+    """Ranges of speed in which shapes of one cable do not last.
+
+    Attributes
+    ----------
+    system : System
+        The cable, its fish and the medium.
+    low, high : float
+        Speeds looked at [-], > 0.
+    windows : tuple of Window
+        Branch by branch.
+    complete : bool
+        Whether all shapes were made out and counted.
+    looked_at : str
+        In words.
+    """
+
+    system: System
+    low: float
+    high: float
+    windows: tuple[Window, ...]
+    complete: bool
+    looked_at: str
+
+
+@dataclass(frozen=True)
 class Folds:
     """Folds of one cable as one of its numbers moves, in rising order of it: at each two shapes meet.
 

@@ -163,7 +163,7 @@ def _panels(motion: Motion, degree: int, panel: float) -> Iterator[_Panel]:
     of_step = _panel_of_step(motion, panel)
     share, weights, integrals = _rule(degree + NODES)
     # From the upper end of the panel down.
-    polynomials = legendre.legvander(1.0 - 2.0 * share, degree)[:, None, :]
+    polynomials: Array = legendre.legvander(1.0 - 2.0 * share, degree)[:, None, :].astype(float)
     for j in range(of_step[-1] + 1):
         steps = np.flatnonzero(of_step == j)
         k, part, whole = _places(motion, steps, share)
