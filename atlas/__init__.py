@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from towatlas.effort import TooMuchWork, patience
     from towatlas.limits import excess_length, massless_cable, threshold_length
-    from towatlas.results import CriticalStates, Cusps, DragFolds, Equilibria, FishPositions, Folds, Stability
+    from towatlas.results import CriticalStates, Cusps, DragFolds, Equilibria, FishPositions, Folds
+    from towatlas.results_motion import Flutter, Stability, Window
     from towatlas.scene.designs import design
     from towatlas.scene.file import read_scene
     from towatlas.scene.jumps import answer_scene
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from towatlas.solve.cusps import cusps
     from towatlas.solve.drag_folds import solve_drag_folds
     from towatlas.solve.equilibria import equilibria
+    from towatlas.solve.flutter import flutter
     from towatlas.solve.folds import folds
     from towatlas.solve.many import equilibria_many
     from towatlas.solve.shapes import shape, shape_of
@@ -35,16 +37,19 @@ __all__ = [
     "DragFolds",
     "Equilibria",
     "FishPositions",
+    "Flutter",
     "Folds",
     "Stability",
     "System",
     "TooMuchWork",
+    "Window",
     "answer_scene",
     "cusps",
     "design",
     "equilibria",
     "equilibria_many",
     "excess_length",
+    "flutter",
     "folds",
     "massless_cable",
     "open_atlas",
@@ -64,7 +69,17 @@ __all__ = [
 _HOMES = {
     "effort": ("TooMuchWork", "patience"),
     "limits": ("excess_length", "massless_cable", "threshold_length"),
-    "results": ("CriticalStates", "Cusps", "DragFolds", "Equilibria", "FishPositions", "Folds", "Stability"),
+    "results": (
+        "CriticalStates",
+        "Cusps",
+        "DragFolds",
+        "Equilibria",
+        "FishPositions",
+        "Flutter",
+        "Folds",
+        "Stability",
+        "Window",
+    ),
     "scene.designs": ("design",),
     "scene.file": ("read_scene",),
     "scene.jumps": ("answer_scene",),
@@ -73,6 +88,7 @@ _HOMES = {
     "solve.cusps": ("cusps",),
     "solve.drag_folds": ("solve_drag_folds",),
     "solve.equilibria": ("equilibria",),
+    "solve.flutter": ("flutter",),
     "solve.folds": ("folds",),
     "solve.many": ("equilibria_many",),
     "solve.shapes": ("shape", "shape_of"),

@@ -16,6 +16,7 @@ from towatlas.commands import (
     design,
     equilibria,
     fish,
+    flutter,
     folds,
     info,
     plot,
@@ -30,7 +31,22 @@ from towatlas.effort import patience
 from towatlas.tables.seal import AtlasFileError
 
 # In the order in which help lists them.
-COMMANDS = (critical, folds, equilibria, stability, shape, fish, scene, sweep, design, build, plot, report, info)
+COMMANDS = (
+    critical,
+    folds,
+    equilibria,
+    stability,
+    flutter,
+    shape,
+    fish,
+    scene,
+    sweep,
+    design,
+    build,
+    plot,
+    report,
+    info,
+)
 
 
 def _parser() -> argparse.ArgumentParser:

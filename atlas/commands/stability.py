@@ -5,7 +5,7 @@ from typing import Any
 
 from towatlas.commands.common import FAILED, OK, add_cable, add_fluid, add_patience, fluid, print_json, real, say
 from towatlas.kernels import status
-from towatlas.results import Stability
+from towatlas.results_motion import Stability
 
 
 def add(commands: Any) -> None:

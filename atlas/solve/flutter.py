@@ -10,11 +10,11 @@ from towatlas.checks import check_speed
 from towatlas.effort import check_patience, patience
 from towatlas.kernels import status
 from towatlas.numerics.rows import EPS
-from towatlas.results import Flutter, Window
-from towatlas.solve.growth import WEAK, Spectrum, has_drag
+from towatlas.results_motion import Flutter, Window
+from towatlas.solve.growth import STILL, WEAK, Spectrum, has_drag, reach_of
 from towatlas.solve.motion import Complex, motions
 from towatlas.solve.paths import Path, Trace, trace
-from towatlas.solve.spectrum import together
+from towatlas.solve.spectrum import polish, together
 from towatlas.system import System
 
 # Speeds looked at are no further apart than this part of them.
@@ -22,7 +22,7 @@ SPACING = 0.01
 # Halvings of a step across an edge by counts, then rounds of secants on what is zero there.
 HALVINGS, ROUNDS = 12, 40
 # Of log gamma, at which an edge is found.
-SETTLED = 1e-14
+SETTLED = 1e-13
 # Circle around two modes that meet without drag, and how far a mode may move from one sample to the next, in units of
 # Omega.
 CIRCLE, FAR = 0.05, 0.2
@@ -187,7 +187,11 @@ class _Follower:
         return _Sample(t, x, nodes, place, Spectrum(self.system, self.speed(t), float(np.exp(x) / self.speed(t) ** 2)))
 
     def between(self, a: _Sample, b: _Sample, t: float) -> _Sample:
-        """The shape of the branch of two samples at a speed between them, by Newton's method."""
+        """The shape of the branch of two samples at a speed between them."""
+        return self.sample(t, self.offset(a, b, t), a.place)
+
+    def offset(self, a: _Sample, b: _Sample, t: float) -> float:
+        """Log of the radius of the fish of that shape, by Newton's method."""
         x = a.x + (t - a.t) / (b.t - a.t) * (b.x - a.x)
         for _ in range(ROUNDS):
             along, _, sound = self.path.log_rho(np.array([x]), np.array([t]), 1)
@@ -197,7 +201,7 @@ class _Follower:
             x -= step
             if abs(step) < 8.0 * EPS:
                 break
-        return self.sample(t, x, a.place)
+        return x
 
     def modes(self, samples: list[_Sample], began: float | None, ended: float | None) -> list[_Mode]:
         """Modes that grow somewhere on a branch."""
@@ -243,16 +247,26 @@ class _Follower:
         for _ in range(ROUNDS):
             share = heights[0] / (heights[0] - heights[1])
             t = ends[0][0] + share * (ends[1][0] - ends[0][0])
-            there = ends[0][1] + share * (ends[1][1] - ends[0][1])
-            here = _nearest(self.between(still, growing, t).spectrum.roots.sigma, there)
+            here = self.mode(still, growing, t, ends[0][1] + share * (ends[1][1] - ends[0][1]))
             side = int(here.real > 0.0)
             moved = abs(ends[side][0] - t)
             # The end that stays counts half, so that it is not kept for ever.
             heights[1 - side] *= 0.5
             ends[side], heights[side] = (t, here), here.real
-            if moved < SETTLED or abs(here.real) < EPS:
+            if moved < SETTLED or abs(here.real) < STILL:
                 break
         return t, here.imag
+
+    def mode(self, a: _Sample, b: _Sample, t: float, guess: complex) -> complex:
+        """The growth rate next to a guess, of the shape between two samples."""
+        speed = self.speed(t)
+        r_f = np.array([np.exp(self.offset(a, b, t)) / speed**2])
+        reach = max(reach_of(self.system, speed), 1.1 * abs(guess))
+        motion = motions(r_f, np.array([speed]), self.system.row()[None], reach)[0]
+        roots, found = polish(motion, np.array([guess]), np.array([guess]))
+        if not found[0]:
+            raise _LostError
+        return complex(roots.sigma[0])
 
     def krein(self, still: _Sample, growing: _Sample, sigma: complex) -> tuple[float, float]:
         """Where two oscillations meet without drag: a zero of the square of half their distance."""
@@ -331,15 +345,17 @@ class _Follower:
         k = mode.samples.index(sample)
         if not 0 < k < len(mode.samples) - 1:
             return sample, growth
-        some = slice(k - 1, k + 2)
-        t = np.array([at.t for at in mode.samples[some]])
-        rates = np.array(
-            [s.real * self.speed(at.t) for at, s in zip(mode.samples[some], mode.sigma[some], strict=True)]
-        )
-        a, b, _ = np.polyfit(t - t[1], rates, 2)
-        if not a < 0.0:
+        around = range(k - 1, k + 2)
+        t = [mode.samples[i].t for i in around]
+        rates = [mode.sigma[i].real * self.speed(mode.samples[i].t) for i in around]
+        slopes = [(rates[i + 1] - rates[i]) / (t[i + 1] - t[i]) for i in range(2)]
+        middles = [0.5 * (t[i + 1] + t[i]) for i in range(2)]
+        if not slopes[0] > slopes[1]:
             return sample, growth
-        there = self.between(mode.samples[k - 1], mode.samples[k + 1], float(t[1] - b / (2.0 * a)))
+        top = middles[0] + slopes[0] * (middles[1] - middles[0]) / (slopes[0] - slopes[1])
+        if not t[0] < top < t[2]:
+            return sample, growth
+        there = self.between(mode.samples[k - 1], mode.samples[k + 1], top)
         if there.spectrum.unstable < 1:
             return sample, growth
         rate = _nearest(there.spectrum.growing, mode.sigma[k]).real * self.speed(there.t)

@@ -15,7 +15,7 @@ from towatlas.system import System
 REACH_CONSERVED, REACH, HANGING = 1.0, 3.0, 2.0
 # Modes that damp faster than this, and than the leading one by this, are left as Galerkin's method has them, in units
 # of Omega.
-DAMPED = 0.3
+DAMPED = 0.1
 # Below this, in units of Omega, growth is weak.
 WEAK = 0.01
 # Growth that rounding cannot be told from.

@@ -7,7 +7,8 @@ import numpy as np
 from towatlas.checks import check_speed
 from towatlas.effort import check_patience, patience
 from towatlas.kernels import status
-from towatlas.results import Equilibria, Stability
+from towatlas.results import Equilibria
+from towatlas.results_motion import Stability
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.growth import REMEDY, Spectrum, has_drag, reach_of
 from towatlas.system import System
