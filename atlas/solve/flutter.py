@@ -11,7 +11,7 @@ from towatlas.effort import check_patience, patience
 from towatlas.kernels import status
 from towatlas.numerics.rows import EPS
 from towatlas.results_motion import Flutter, Window
-from towatlas.solve.growth import STILL, WEAK, Spectrum, has_drag, reach_of
+from towatlas.solve.growth import WEAK, Spectrum, has_drag, reach_of
 from towatlas.solve.motion import Complex, motions
 from towatlas.solve.paths import Path, Trace, trace
 from towatlas.solve.spectrum import polish, together
@@ -101,7 +101,8 @@ def flutter(
     All shapes are followed from speed to speed. What grows is counted (see `stability`) at speeds no further apart than
     0.01 of them, so that no window wider than that is missed. With drag an edge is a zero of the growth of a mode, a
     Hopf point; without drag two oscillations meet there, a Krein collision, and the square of half their distance,
-    which is smooth, is zero. Windows of different modes may overlap; one inside another goes with it.
+    which is smooth, is zero. Windows of different modes may overlap; one inside another, without an
+    edge of its own, goes with it.
 
     Examples
     --------
@@ -253,7 +254,7 @@ class _Follower:
             # The end that stays counts half, so that it is not kept for ever.
             heights[1 - side] *= 0.5
             ends[side], heights[side] = (t, here), here.real
-            if moved < SETTLED or abs(here.real) < STILL:
+            if moved < SETTLED or abs(here.real) < EPS:
                 break
         return t, here.imag
 
@@ -302,17 +303,18 @@ class _Follower:
         return float((((one - other) / 2.0) ** 2).real)
 
     def windows(self, modes: list[_Mode]) -> Iterator[Window]:
-        """A window a mode, those inside that of another with it; weak ones by themselves where they are outside."""
+        """A window a mode; one without an edge of its own goes with that which it is inside of."""
         groups: list[list[_Mode]] = []
         weak = {id(mode): max(s.real for s in mode.sigma) < WEAK for mode in modes}
         # Long ones first, strong ones before weak ones.
         for mode in sorted(modes, key=lambda mode: (weak[id(mode)], mode.start.t - mode.end.t)):
-            for group in groups:
-                if group[0].start.t <= mode.start.t and mode.end.t <= group[0].end.t:
-                    group.append(mode)
-                    break
-            else:
+            own = {mode.start.kind, mode.end.kind} & {"hopf", "krein"}
+            within = (g for g in groups if g[0].start.t <= mode.start.t and mode.end.t <= g[0].end.t)
+            group = None if own else next(within, None)
+            if group is None:
                 groups.append([mode])
+            else:
+                group.append(mode)
         for group in sorted(groups, key=lambda group: group[0].start.t):
             yield self.window(group, weak=weak[id(group[0])])
 
