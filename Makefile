@@ -49,11 +49,13 @@ check: types  ## ruff, types, import layers
 	$(BIN)/ruff format --check .
 	PYTHONPATH=build/tree $(BIN)/lint-imports --no-logo
 
-figures: install  ## draw the figures of the README from build/atlas.nc, and of NRL Report 7048 (build/report.html)
+figures: install  ## draw the figures of the README from build/atlas.nc, and the pages of the sources (build/*.html)
 	@test -f $(ATLAS) || $(MAKE) --no-print-directory atlas
 	$(BIN)/python -m towatlas plot critical --atlas $(ATLAS) --out docs/critical.svg
 	$(BIN)/python -m towatlas plot critical --atlas $(ATLAS) --out docs/critical.png
-	$(BIN)/python -m towatlas report --out build/report.html
+	$(BIN)/python -m towatlas report nrl7048 --out build/report.html
+	$(BIN)/python -m towatlas report cable-body --out build/cable-body.html
+	$(BIN)/python -m towatlas report dtmb713 --out build/dtmb713.html
 
 clean:  ## remove .venv, build and caches
 	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache

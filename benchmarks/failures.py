@@ -16,7 +16,7 @@ import numpy as np
 import towatlas
 from towatlas.kernels import status
 from towatlas.kernels.sweeps import forward_shots_parallel
-from towatlas.report.published import compare
+from towatlas.report.nrl7048.published import compare
 from towatlas.solve.members import shoot_lanes, solve_members
 
 DOCS = Path(__file__).parent.parent / "docs"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from towatlas.report import page as report
+from towatlas.report.nrl7048 import page as report
 from towatlas.scene.choice import Choice, choose, compare
 from towatlas.scene.file import read_scene
 from towatlas.scene.jumps import SceneAnswer, answer_scene

@@ -1,6 +1,8 @@
-"""What several tests use: shots with named results, random cables, small files, a wet scene, the shell."""
+"""What several tests use: shots with named results, random cables, small files, a wet scene, the shell, pages."""
 
+import re
 from dataclasses import dataclass
+from html.parser import HTMLParser
 from typing import Any
 
 import numpy as np
@@ -107,3 +109,57 @@ def changed(**changes):
         else:
             holder[key or section] = value
     return table
+
+
+VOID = {"meta", "link", "br", "img", "hr", "input"}
+
+
+class Page(HTMLParser):
+    """Checks nesting; collects ids, references, and the text of every cell of every table and of every paragraph."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.ids, self.references, self.rows, self.text = [], [], [], [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in VOID:
+            self.open.append(tag)
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+        if tag == "sub" and {"td", "th"} & set(self.open):
+            self.rows[-1][-1] += "_"
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(value)
+            elif name in ("href", "xlink:href", "src"):
+                self.references.append(value)
+            if "url(" in (value or ""):
+                self.references.append(re.search(r"url\((.*?)\)", value)[1])
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+        if "td" in self.open or "th" in self.open:
+            self.rows[-1][-1] += data
+
+
+def check_stands_alone(page):
+    """The page parsed: well nested, every reference within it, nothing from elsewhere, every symbol filled in."""
+    parsed = Page(page)
+    assert len(parsed.ids) == len(set(parsed.ids))
+    assert {reference.removeprefix("#") for reference in parsed.references} <= set(parsed.ids)
+    elsewhere = re.sub(r'xmlns(:\w+)?="[^"]*"', "", page)
+    for word in ("http:", "https:", "file:", "data:", "src=", "<link", "<script", "@import", "$"):
+        assert word not in elsewhere, word
+    return parsed

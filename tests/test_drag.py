@@ -18,7 +18,7 @@ from towatlas.kernels import status
 from towatlas.kernels.steppers import ORDER
 from towatlas.kernels.system import COLUMNS
 from towatlas.kernels.vector import LANES, aligned
-from towatlas.report.page import PHOTOGRAPHS
+from towatlas.report.nrl7048.page import PHOTOGRAPHS
 from towatlas.solve.drag_equilibria import solve_drag_equilibria
 from towatlas.solve.jets import jets_of
 from towatlas.solve.shapes import shape_of

@@ -15,7 +15,7 @@ import towatlas
 from benchmarks import failures
 from towatlas.kernels import status
 from towatlas.limits import excess_length, long_cable, massless_cable, threshold_length
-from towatlas.report.published import rk4_root
+from towatlas.report.nrl7048.published import rk4_root
 
 
 def exact_root(lam, w_f, gamma, x_f):

@@ -14,7 +14,7 @@ from helpers import changed, run
 from benchmarks import models
 from towatlas.commands.scene import text_of
 from towatlas.kernels import status
-from towatlas.report.page import PHOTOGRAPHS
+from towatlas.report.nrl7048.page import PHOTOGRAPHS
 from towatlas.scene.choice import choose, compare, least_model
 from towatlas.scene.file import make_scene, read_scene
 from towatlas.scene.jumps import answer_scene

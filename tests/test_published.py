@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from helpers import boundary_error
 
-from towatlas.report.published import PUBLISHED, compare, euler_root, rk4_root
+from towatlas.report.nrl7048.published import PUBLISHED, compare, euler_root, rk4_root
 
 ROWS = {row.published.quantity: row for row in compare()}
 

@@ -1,71 +1,29 @@
-"""The report, reproduced: its page stands alone and lacks nothing, and its curves are what they say they are."""
+"""NRL Report 7048, reproduced: its page stands alone and lacks nothing, and its curves are what they say they are."""
 
 import html
 import re
-from html.parser import HTMLParser
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from helpers import run
+from helpers import Page, check_stands_alone, run
 from matplotlib.artist import Artist
 from matplotlib.lines import Line2D
 
 import towatlas
-from towatlas.report.figures import DRAWN_SEGMENTS, FIG_16, WINDOWS, Cable, coarse_gap, root_names
-from towatlas.report.page import FIGURES, MODELS, PHOTOGRAPHS, expected_nodes, report_page
-from towatlas.report.published import PUBLISHED, compare
+from towatlas.report.nrl7048.figures import DRAWN_SEGMENTS, FIG_16, WINDOWS, Cable, coarse_gap, root_names
+from towatlas.report.nrl7048.page import FIGURES, MODELS, PHOTOGRAPHS, expected_nodes, report_page
+from towatlas.report.nrl7048.published import PUBLISHED, compare
 
 # Of a page that takes a dozen seconds.
 pytestmark = pytest.mark.slow
 
 CURVES = [figure for figure in FIGURES if figure.cables]
-VOID = {"meta", "link", "br", "img", "hr", "input"}
 
 
 @pytest.fixture(scope="module")
 def page():
     return report_page()
-
-
-class Page(HTMLParser):
-    """Checks nesting; collects ids, references, and the text of every cell of every table and of every paragraph."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.ids, self.references, self.rows, self.text = [], [], [], [], []
-        self.feed(text)
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        if tag not in VOID:
-            self.open.append(tag)
-        if tag == "tr":
-            self.rows.append([])
-        if tag in ("td", "th"):
-            self.rows[-1].append("")
-        if tag == "sub" and {"td", "th"} & set(self.open):
-            self.rows[-1][-1] += "_"
-        for name, value in attrs:
-            if name == "id":
-                self.ids.append(value)
-            elif name in ("href", "xlink:href", "src"):
-                self.references.append(value)
-            if "url(" in (value or ""):
-                self.references.append(re.search(r"url\((.*?)\)", value)[1])
-
-    def handle_startendtag(self, tag, attrs):
-        self.handle_starttag(tag, attrs)
-        if tag not in VOID:
-            self.open.pop()
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.text.append(data)
-        if "td" in self.open or "th" in self.open:
-            self.rows[-1][-1] += data
 
 
 def plain(cell):
@@ -76,12 +34,7 @@ def plain(cell):
 
 
 def test_page_stands_alone(page):
-    parsed = Page(page)
-    assert len(parsed.ids) == len(set(parsed.ids))
-    assert {reference.removeprefix("#") for reference in parsed.references} <= set(parsed.ids)
-    elsewhere = re.sub(r'xmlns(:\w+)?="[^"]*"', "", page)
-    for word in ("http:", "https:", "file:", "data:", "src=", "<link", "<script", "@import", "$"):
-        assert word not in elsewhere, word
+    check_stands_alone(page)
 
 
 def test_every_figure_is_in_the_page(page):
@@ -124,6 +77,12 @@ def test_same_bytes_twice(page, tmp_path, capsys):
     assert (code, out) == (0, "")
     assert "wrote" in err
     assert (tmp_path / "new" / "report.html").read_bytes() == page.encode()
+
+
+def test_unknown_source(capsys):
+    code, _, err = run(capsys, "report", "nrl7049")
+    assert code == 2
+    assert "'nrl7048', 'cable-body', 'dtmb713'" in err
 
 
 def test_page_of_an_unknown_kind(capsys, tmp_path):

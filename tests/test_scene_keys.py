@@ -1,6 +1,5 @@
 """Keys of a scene beyond the report's: forces along and aside, types of cable, spheres, circles; what is said."""
 
-import csv
 import io
 import json
 import math
@@ -16,6 +15,7 @@ from helpers import changed, run
 
 from towatlas import read_scene
 from towatlas.commands.scene import text_of
+from towatlas.report.dtmb713.data import points
 from towatlas.scene.angles import angles_along
 from towatlas.scene.choice import least_model
 from towatlas.scene.file import SceneFileError, make_scene
@@ -213,22 +213,13 @@ def test_jumps_in_a_turn_to_port():
     assert least_model(scene, asked=quiet).model == least_model(read_scene("skop-fig3"), asked=quiet).model
 
 
-def points(cable):
-    path = Path(__file__).parent / "data" / "pode1950.csv"
-    with path.open() as file:
-        rows = [row for row in csv.DictReader(line for line in file if line[0] != "#") if row["cable"] == cable]
-    names = ("speed_kn", "m", "n", "sin_phi", "phi_deg", "C_n", "C_s", "C_f")
-    return SimpleNamespace(**{name: np.array([float(row[name]) for row in rows]) for name in names})
-
-
 @pytest.mark.parametrize("letter", TYPES)
 def test_laws_of_the_library_are_those_of_its_points(letter):
     """Recomputed from Table 2 of DTMB Report 713: means, medians, a least squares fit that nothing nearby betters."""
     cable, data = find_type(f"pode-{letter}"), points(letter)
-    normal = data.C_n / data.sin_phi**2
     values, sd = cable.values, cable.deviations
-    assert values["drag_coefficient"] == pytest.approx(normal.mean(), abs=0.002)
-    assert sd["drag_coefficient"] == pytest.approx(normal.std(ddof=1), abs=0.01)
+    assert values["drag_coefficient"] == pytest.approx(data.ratio.mean(), abs=0.0006)
+    assert sd["drag_coefficient"] == pytest.approx(data.ratio.std(ddof=1), abs=0.006)
     assert values["tangential_drag_coefficient"] == np.median(data.C_f)
     assert sd["tangential_drag_coefficient"] == pytest.approx(data.C_f.std(ddof=1), rel=0.25)
     assert cable.angles_deg == pytest.approx((data.phi_deg.min(), data.phi_deg.max()), rel=1e-12)
@@ -249,7 +240,7 @@ def test_cables_trail_as_measured(letter):
     data = points(letter)
     table = typed(f"pode-{letter}", fish=None, fluid__density="1.934 slug/ft3", cable__length="60 ft")
     off = []
-    for speed, down, aside in zip(data.speed_kn, data.m, data.n, strict=True):
+    for speed, down, aside in zip(data.speed, data.m, data.n, strict=True):
         scene = make_scene(table | {"tow": {"radius": "1000 km", "speed": f"{speed} kn", "turn": "starboard"}})
         x, y, z = solve_model(scene, "water").position
         # The tow point moves along y, and starboard is inwards.

@@ -1,1 +1,1 @@
-"""NRL Report 7048, reproduced."""
+"""The source documents, reproduced: a page for each."""

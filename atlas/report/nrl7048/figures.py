@@ -15,7 +15,7 @@ from towatlas.kernels.scan import forward_shots, reaction_bounds
 from towatlas.limits import threshold_length
 from towatlas.nomenclature import EQUILIBRIUM, SYMBOLS
 from towatlas.plot.critical import LIMIT, STYLES
-from towatlas.report.published import SEGMENTS
+from towatlas.report.nrl7048.published import SEGMENTS
 from towatlas.results import Equilibria
 from towatlas.solve.equilibria import equilibria
 from towatlas.solve.shapes import shape

@@ -1,4 +1,4 @@
-"""Words and frame of the page that reproduces NRL Report 7048."""
+"""Words of the page that reproduces NRL Report 7048."""
 
 CAPTIONS = {
     9: "The length of cable up to which no shape has a node, Eq. (36): &lambda;<sub>c</sub> = 1 &minus; "
@@ -31,48 +31,8 @@ CAPTIONS = {
     "takes that as evidence for the median root.",
 }
 
-# $ marks what `towatlas.report.page` fills in.
-PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>NRL Report 7048, reproduced</title>
-<style>
-body { max-width: 54rem; margin: 2rem auto; padding: 0 1rem; background: #fff; color: #111;
-  font: 1rem/1.5 Georgia, "Times New Roman", serif; }
-h1, h2, h3, th, nav { font-family: "Helvetica Neue", Arial, sans-serif; line-height: 1.25; }
-h1 { font-size: 1.7rem; } h2 { font-size: 1.3rem; margin-top: 2.5rem; } h3 { font-size: 1.05rem; margin-top: 2.5rem; }
-a { color: #0050a0; }
-figure { margin: 0; break-inside: avoid; }
-figure svg { display: block; margin: 0 auto; max-width: 100%; height: auto; }
-figcaption { margin: .5rem 0 1rem; }
-table { border-collapse: collapse; width: 100%; font-size: .85rem; line-height: 1.35; }
-.wide { overflow-x: auto; }
-th, td { padding: .3rem .4rem; border-bottom: 1px solid #ccc; text-align: left; vertical-align: top; }
-thead th { border-bottom: 2px solid #111; }
-.numbers td:nth-child(2) { min-width: 9rem; }
-.numbers td:last-child { min-width: 10rem; }
-.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-tr { break-inside: avoid; }
-tr.differs td, td.wrong { background: #fdeee0; }
-td.wrong { font-weight: bold; }
-.narrow { width: auto; margin: 0 auto; }
-small { color: #333; white-space: normal; }
-sub, sup { line-height: 0; }
-@media print {
-  @page { margin: 16mm; }
-  body { max-width: none; margin: 0; padding: 0; font-size: 10pt; }
-  .wide { overflow: visible; }
-  h2, h3 { break-after: avoid; }
-  thead { display: table-header-group; }
-  table { font-size: 8pt; }
-  a { color: inherit; text-decoration: none; }
-}
-</style>
-</head>
-<body>
-<h1>NRL Report 7048, reproduced</h1>
+# $ marks what `towatlas.report.nrl7048.page` fills in.
+BODY = """\
 <p>R. A. Skop, <cite>On the Shape of a Cable Towed in a Circular Path</cite>, Naval Research Laboratory, 1970: each of
 its figures of the cable in a vacuum, drawn anew by towatlas, and each number that it prints beside the same number
 recomputed. Lengths are over the tow radius <i>R</i>, forces over (&mu; + &rho;<i>A</i>) <i>g</i> <i>R</i>; &lambda;
@@ -117,7 +77,4 @@ that of the equilibrium whose fish is nearest to the axis.</p>
 $photographs</tbody></table>
 <p>$failures</p>
 <p>The weights of the fish and the drag constant are recomputed <a href="#numbers">above</a>. The lengths of the cables
-are not printed; with the tow radius of 11/16 in the values of &lambda; give $lengths.</p>
-</body>
-</html>
-"""
+are not printed; with the tow radius of 11/16 in the values of &lambda; give $lengths.</p>"""

@@ -1,21 +1,18 @@
 """NRL Report 7048 reproduced: its figures and its numbers, printed and recomputed, in one page that needs no other."""
 
 import html
-import io
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from string import Template
-from typing import Any
 
-import matplotlib
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from towatlas.report.figures import (
+from towatlas.effort import check_patience
+from towatlas.report import frame
+from towatlas.report.frame import maths, number
+from towatlas.report.nrl7048.figures import (
     DRAWN_SEGMENTS,
     FIG_10,
     FIG_12,
@@ -36,8 +33,8 @@ from towatlas.report.figures import (
     plot_two_node_shapes,
     root_names,
 )
-from towatlas.report.published import SEGMENTS, Comparison, compare
-from towatlas.report.text import CAPTIONS, PAGE
+from towatlas.report.nrl7048.published import SEGMENTS, Comparison, compare
+from towatlas.report.nrl7048.text import BODY, CAPTIONS
 from towatlas.solve.critical import solve_critical
 from towatlas.solve.equilibria import equilibria
 
@@ -151,26 +148,6 @@ def expected_nodes(*, lam: float, w_f: float, gamma: float, C: float = 0.0) -> i
 MODELS = (("in a vacuum", 0.0), ("with drag", DRAG))
 
 
-def write_report(path: str | Path) -> Path:
-    """Write the page to a file; the same bytes every time on one machine.
-
-    Parameters
-    ----------
-    path : str or Path
-        Where to; its directory is made if need be.
-
-    Returns
-    -------
-    Path
-        The same.
-    """
-    path = Path(path)
-    page = report_page()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(page, encoding="utf-8")
-    return path
-
-
 def report_page() -> str:
     """The page, as HTML with inline figures and nothing from elsewhere.
 
@@ -178,12 +155,15 @@ def report_page() -> str:
     -------
     str
     """
-    rows = compare()
-    return Template(PAGE).substitute(
+    rows, figures = compare(), []
+    for k, figure in enumerate(FIGURES):
+        check_patience("figures of the page", "there is no smaller page", done=k, of=len(FIGURES))
+        figures.append(_figure(figure))
+    body = Template(BODY).substitute(
         verdict=_verdict(rows),
         contents="".join(f'<li><a href="#fig{f.number}">Fig. {f.number}</a> {f.title}</li>\n' for f in FIGURES),
         numbers="".join(_number_row(row) for row in rows),
-        figures="".join(_figure(figure) for figure in FIGURES),
+        figures="".join(figures),
         models="".join(f'<th scope="col" class="n">{title}</th>' for title, _ in MODELS),
         photographs="".join(_photograph_row(photograph) for photograph in PHOTOGRAPHS),
         failures=_failures(),
@@ -192,6 +172,7 @@ def report_page() -> str:
         segments=SEGMENTS,
         drawn_segments=f"{DRAWN_SEGMENTS:,}",
     )
+    return frame.page("NRL Report 7048, reproduced", body)
 
 
 def _verdict(rows: list[Comparison]) -> str:
@@ -202,8 +183,8 @@ def _verdict(rows: list[Comparison]) -> str:
     right = sum(row.agrees for row in values)
     kept = sum(row.agrees for row in bounds)
     differing = "".join(
-        f"<li>{_maths(row.published.quantity)}: printed {_number(row.text()[0])}, recomputed {_number(row.text()[1])}. "
-        f"{_maths(row.published.explanation)}</li>\n"
+        f"<li>{maths(row.published.quantity)}: printed {number(row.text()[0])}, recomputed {number(row.text()[1])}. "
+        f"{maths(row.published.explanation)}</li>\n"
         for row in values + bounds
         if not row.agrees
     )
@@ -220,12 +201,12 @@ def _number_row(row: Comparison) -> str:
     verdict = ("agrees" if p.relation == "=" else "holds") if row.agrees else "differs"
     if p.relation == "~":
         verdict = "approximate"
-    then = f"{_number(then)}<br><small>{html.escape(p.method)}</small>" if then else ""
-    numbers = (_number(printed), _number(recomputed), _difference(row), then)
+    then = f"{number(then)}<br><small>{html.escape(p.method)}</small>" if then else ""
+    numbers = (number(printed), number(recomputed), _difference(row), then)
     cells = "".join(f'<td class="n">{number}</td>' for number in numbers)
     return (
-        f'<tr class="{verdict}"><td>{p.place.replace("Fig. ", "Fig.&nbsp;")}</td><td>{_maths(p.quantity)}</td>'
-        f"{cells}<td>{_maths(p.explanation)}</td></tr>\n"
+        f'<tr class="{verdict}"><td>{p.place.replace("Fig. ", "Fig.&nbsp;")}</td><td>{maths(p.quantity)}</td>'
+        f"{cells}<td>{maths(p.explanation)}</td></tr>\n"
     )
 
 
@@ -235,7 +216,7 @@ def _difference(row: Comparison) -> str:
         return ""
     difference = row.recomputed - row.published.printed
     decimals = len(row.text()[1].partition(".")[2])
-    return "0" if difference == 0.0 else _number(f"{difference:+.{decimals}f}")
+    return "0" if difference == 0.0 else number(f"{difference:+.{decimals}f}")
 
 
 def _figure(figure: ReportFigure) -> str:
@@ -247,11 +228,15 @@ def _figure(figure: ReportFigure) -> str:
         lam, w_f, _ = figure.folds[0]
         plural = "s" if len(figure.folds) > 1 else ""
         notes.append(f"Critical speed{plural} at &lambda; = {lam:g}, <i>w</i><sub>f</sub> = {w_f:g}: {speeds}.")
-    return (
-        f'<section id="fig{figure.number}">\n<h3>Fig. {figure.number}. {figure.title}</h3>\n<figure>\n'
-        f"{_svg(figure)}\n<figcaption>{' '.join([CAPTIONS[figure.number], *notes])}</figcaption>\n</figure>\n"
-        f"{_root_table(figure.cables)}</section>\n"
+    title = f"Fig. {figure.number}. {figure.title}"
+    drawing = frame.svg(
+        f"fig{figure.number}",
+        f"Fig. {figure.number}: {figure.title}",
+        SIZES[figure.number],
+        lambda drawing: figure.draw(drawing.subplots()),
     )
+    caption = " ".join([CAPTIONS[figure.number], *notes])
+    return frame.figure(f"fig{figure.number}", title, drawing, caption, _root_table(figure.cables))
 
 
 def _gap_sentence(figure: ReportFigure) -> str:
@@ -259,8 +244,8 @@ def _gap_sentence(figure: ReportFigure) -> str:
     seen = "too little to see" if gap < VISIBLE else "enough to see"
     where = f"curve {cable.name}" if cable.name else f"&gamma; = {cable.gamma:g}"
     return (
-        f"With the report's {SEGMENTS} segments the curves lie within {_number(format(100.0 * gap, '.2g'))} % of the "
-        f"height from these, {seen}; farthest at {where}, <i>R</i><sub>x0</sub> = {_number(format(r_x0, '.4g'))}."
+        f"With the report's {SEGMENTS} segments the curves lie within {number(format(100.0 * gap, '.2g'))} % of the "
+        f"height from these, {seen}; farthest at {where}, <i>R</i><sub>x0</sub> = {number(format(r_x0, '.4g'))}."
     )
 
 
@@ -274,7 +259,7 @@ def _root_table(cables: tuple[Cable, ...]) -> str:
         for k, name in enumerate(root_names(found)):
             head = f'<th scope="rowgroup" rowspan="{len(found)}">{cable.name} {facts}</th>' if k == 0 else ""
             columns = (found.R_x0, ".9g"), (found.x_f, ".6f"), (found.z_f, ".6f")
-            cells = "".join(f'<td class="n">{_number(format(column[k], form))}</td>' for column, form in columns)
+            cells = "".join(f'<td class="n">{number(format(column[k], form))}</td>' for column, form in columns)
             median = ", median" if k == len(found) // 2 else ""
             name = f"<i>R</i><sup>{name}</sup>{median}"
             rows.append(f'<tr>{head}<td>{name}</td>{cells}<td class="n">{found.nodes[k]}</td></tr>\n')
@@ -314,40 +299,3 @@ def _failures() -> str:
                 f"&gamma;<sub>c{p.nodes}</sub> = {speed:.3f} on, {above:.1f} % above the speed of the photograph."
             )
     return " ".join(sentences)
-
-
-def _svg(figure: ReportFigure) -> str:
-    """The figure as an element of the page, with ids that no other figure has."""
-    style: Any = {"svg.hashsalt": "towatlas", "svg.fonttype": "path", "font.size": 10.0}
-    with matplotlib.rc_context(style):
-        drawing = Figure(figsize=SIZES[figure.number], layout="constrained")
-        figure.draw(drawing.subplots())
-        buffer = io.StringIO()
-        drawing.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
-    text = buffer.getvalue()
-    text = re.sub(r"<!--.*?-->\n?", "", text[text.index("<svg") :], flags=re.S).strip()
-    text = re.sub(r'(\bid="|href="#|url\(#)', rf"\1fig{figure.number}-", text)
-    label = html.escape(f"Fig. {figure.number}: {figure.title}")
-    return text.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
-
-
-_SYMBOL = re.compile(r"\b(lambda|gamma)(?:_(c\d?))?\b|\b([Rwxz])_(x0|f)\b|\b(E)\b")
-
-
-def _maths(text: str) -> str:
-    """Plain text as HTML, its symbols set as such, equations not broken."""
-
-    def symbol(match: re.Match[str]) -> str:
-        greek, letter, error = match[1], match[3], match[5]
-        name = {"lambda": "&lambda;", "gamma": "&gamma;"}[greek] if greek else f"<i>{letter or error}</i>"
-        below = match[2] or match[4]
-        return name + (f"<sub>{below}</sub>" if below else "")
-
-    text = _SYMBOL.sub(symbol, re.sub(r"(?<![\w.])-(?=\d)", "&minus;", html.escape(text, quote=False)))
-    return text.replace(" = ", "&nbsp;=&nbsp;")
-
-
-def _number(text: str) -> str:
-    """A formatted number with a true minus, infinity as a sign and powers of ten as such."""
-    text = re.sub(r"e([+-])0*(\d+)", lambda m: f"&middot;10<sup>{m[1].strip('+')}{m[2]}</sup>", html.escape(text))
-    return text.replace("-", "&minus;").replace("inf", "&infin;")

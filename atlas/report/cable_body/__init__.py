@@ -1,0 +1,1 @@
+"""A cable-body system towed in a circle in water, reproduced."""

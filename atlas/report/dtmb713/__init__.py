@@ -1,0 +1,1 @@
+"""DTMB Report 713 (Pode 1950), reproduced."""

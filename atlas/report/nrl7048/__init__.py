@@ -1,0 +1,1 @@
+"""NRL Report 7048, reproduced."""
