@@ -10,13 +10,14 @@ if TYPE_CHECKING:
     from towatlas.effort import TooMuchWork, patience
     from towatlas.limits import excess_length, massless_cable, threshold_length
     from towatlas.results import CriticalStates, Cusps, DragFolds, Equilibria, FishPositions, Folds
-    from towatlas.results_motion import Flutter, Stability, Window
+    from towatlas.results_motion import Branch, Diagram, Flutter, Stability, Window
     from towatlas.scene.designs import design
     from towatlas.scene.file import read_scene
     from towatlas.scene.jumps import answer_scene
     from towatlas.scene.sweeps import sweep
     from towatlas.solve.critical import solve_critical
     from towatlas.solve.cusps import cusps
+    from towatlas.solve.diagram import diagram
     from towatlas.solve.drag_folds import solve_drag_folds
     from towatlas.solve.equilibria import equilibria
     from towatlas.solve.flutter import flutter
@@ -32,8 +33,10 @@ __version__ = "0.1.0"
 __all__ = [
     "Atlas",
     "AtlasFileError",
+    "Branch",
     "CriticalStates",
     "Cusps",
+    "Diagram",
     "DragFolds",
     "Equilibria",
     "FishPositions",
@@ -46,6 +49,7 @@ __all__ = [
     "answer_scene",
     "cusps",
     "design",
+    "diagram",
     "equilibria",
     "equilibria_many",
     "excess_length",
@@ -86,6 +90,7 @@ _HOMES = {
     "scene.sweeps": ("sweep",),
     "solve.critical": ("solve_critical",),
     "solve.cusps": ("cusps",),
+    "solve.diagram": ("diagram",),
     "solve.drag_folds": ("solve_drag_folds",),
     "solve.equilibria": ("equilibria",),
     "solve.flutter": ("flutter",),

@@ -1,13 +1,18 @@
 """What the program answers about motions of a cable: which shapes last. All numbers are dimensionless unless said."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.kernels import status as codes
+from towatlas.kernels.system import COLUMNS
 from towatlas.results import Array, Equilibria, Integers
 from towatlas.system import System
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @dataclass(frozen=True)
@@ -132,3 +137,160 @@ class Flutter:
     windows: tuple[Window, ...]
     complete: bool
     looked_at: str
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a branch begins, ends or changes.
+
+    Attributes
+    ----------
+    kind : str
+        "fold", "hopf", "krein", "range" or "unknown", as of `Window`.
+    gamma : float
+        Speed Omega sqrt(R/g) [-], > 0.
+    x_f, r_f, z_f, tension : float
+        As of `Branch`; at a fold computed, elsewhere between samples 1 % apart.
+    """
+
+    kind: str
+    gamma: float
+    x_f: float
+    r_f: float
+    z_f: float
+    tension: float
+
+
+@dataclass(frozen=True, repr=False)
+class Branch:
+    """One branch of shapes over the speed.
+
+    Attributes
+    ----------
+    name : str
+        At its highest speed, as of `Equilibria`.
+    gamma : ndarray, shape (samples,)
+        Speeds Omega sqrt(R/g) [-], rising.
+    nodes : ndarray of int, shape (samples,)
+        Sign changes of x along the cable [-], >= 0.
+    x_f, r_f, z_f : ndarray, shape (samples,)
+        Position of the fish, its distance from the axis, its depth below the tow point, over tow radius [-].
+    tension : ndarray, shape (samples,)
+        At the tow point, over (mu + rho A) g R [-], > 0.
+    growth, frequency : ndarray, shape (samples,)
+        Of the leading eigenvalue over sqrt(g/R) [-].
+    unstable : ndarray of int, shape (samples,)
+        How many eigenvalues grow; -1 if not counted.
+    kind : ndarray of str, shape (samples,)
+        As of `Stability`.
+    points : tuple of Point
+        Where the branch begins, changes and ends, in rising speed.
+    between : tuple of str
+        The kind that it is of between each of them and the next.
+    """
+
+    name: str
+    gamma: Array
+    nodes: Integers
+    x_f: Array
+    r_f: Array
+    z_f: Array
+    tension: Array
+    growth: Array
+    frequency: Array
+    unstable: Integers
+    kind: NDArray[np.str_]
+    points: tuple[Point, ...]
+    between: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        text = f"Branch {self.name!r}: gamma {self.points[0].gamma:.6g} ({self.points[0].kind})"
+        for k, (kind, point) in enumerate(zip(self.between, self.points[1:], strict=True)):
+            # What goes on as it was is no change.
+            if k + 1 == len(self.between) or self.between[k + 1] != kind:
+                text += f" {kind} {point.gamma:.6g} ({point.kind})"
+        return text
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """All branches of shapes of one cable over its speed.
+
+    Attributes
+    ----------
+    system : System
+        The cable, its fish and the medium.
+    low, high : float
+        Speeds looked at [-], > 0.
+    branches : tuple of Branch
+        In the order of their lowest speeds, from the outermost inwards.
+    complete : bool
+        Whether all shapes were made out and counted.
+    looked_at : str
+        In words.
+    """
+
+    system: System
+    low: float
+    high: float
+    branches: tuple[Branch, ...]
+    complete: bool
+    looked_at: str
+
+    def to_dataset(self) -> "xarray.Dataset":
+        """The diagram as a dataset.
+
+        Returns
+        -------
+        xarray.Dataset
+            gamma, nodes, x_f, r_f, z_f, tension, growth, frequency, unstable and lasts over (branch, sample), nan or -1
+            beyond the last of a branch; lasts is 1 where the kind is "stable", 0 where it is another, -1 if unknown.
+            point_gamma and point_kind over (branch, point), name over branch.
+        """
+        import xarray
+
+        size = max(len(branch.gamma) for branch in self.branches)
+        points = max(len(branch.points) for branch in self.branches)
+
+        def filled(columns: list[Array], width: int, missing: float, kind: type) -> Array:
+            out: Array = np.full((len(columns), width), missing, kind)
+            for row, column in zip(out, columns, strict=True):
+                row[: len(column)] = column
+            return out
+
+        variables: dict[str, Any] = {}
+        for name, text in _DIAGRAM.items():
+            whole = name in ("nodes", "unstable")
+            columns = [getattr(branch, name) for branch in self.branches]
+            data = filled(columns, size, -1 if whole else np.nan, np.int32 if whole else np.float64)
+            variables[name] = (("branch", "sample"), data, {"long_name": text, "units": "1"})
+        lasts = [np.where(b.kind == "unknown", -1, (b.kind == "stable").astype(int)) for b in self.branches]
+        about = {"long_name": "whether the shape lasts, -1 if not known", "units": "1"}
+        variables["lasts"] = (("branch", "sample"), filled(lasts, size, -1, np.int8), about)
+        speeds = [np.array([point.gamma for point in branch.points]) for branch in self.branches]
+        about = {"long_name": "speed at which the branch begins, changes or ends", "units": "1"}
+        variables["point_gamma"] = (("branch", "point"), filled(speeds, points, np.nan, np.float64), about)
+        kinds = [[point.kind for point in b.points] + [""] * (points - len(b.points)) for b in self.branches]
+        variables["point_kind"] = (("branch", "point"), np.array(kinds, np.str_), {"long_name": "what is there"})
+        names = np.array([branch.name for branch in self.branches], np.str_)
+        variables["name"] = (("branch",), names, {"long_name": "name of the branch at its highest speed"})
+        facts = {name: getattr(self.system, name) for name in COLUMNS}
+        attributes = {
+            "title": "Branches of shapes of a towed cable",
+            "Conventions": "CF-1.11",
+            "looked_at": self.looked_at,
+        }
+        return xarray.Dataset(variables, attrs=attributes | facts)
+
+
+_DIAGRAM = {
+    "gamma": "speed Omega sqrt(R/g)",
+    "nodes": "sign changes of x along the cable",
+    "x_f": "position of the fish over tow radius",
+    "r_f": "distance of the fish from the axis over tow radius",
+    "z_f": "depth of the fish below the tow point over tow radius",
+    "tension": "tension at the tow point over (mu + rho A) g R",
+    "growth": "growth of the leading eigenvalue over sqrt(g/R)",
+    "frequency": "frequency of the leading eigenvalue over sqrt(g/R)",
+    "unstable": "number of eigenvalues that grow, -1 if not counted",
+}

@@ -13,8 +13,8 @@ from towatlas.numerics.rows import EPS
 from towatlas.results_motion import Flutter, Window
 from towatlas.solve.growth import WEAK, Spectrum, has_drag, reach_of
 from towatlas.solve.motion import Complex, motions
-from towatlas.solve.paths import Path, Trace, trace
-from towatlas.solve.spectrum import polish, together
+from towatlas.solve.paths import Fold, Path, Trace, trace
+from towatlas.solve.spectrum import CLOSE, polish, together
 from towatlas.system import System
 
 # Speeds looked at are no further apart than this part of them.
@@ -30,7 +30,7 @@ REMEDY = "a narrower range of speeds, or a shorter cable, has fewer shapes to lo
 
 
 @dataclass(frozen=True)
-class _Sample:
+class Sample:
     """A shape of one branch: the logarithm t of its speed over the lowest, that of the radius of its fish over
     g / Omega^2, its nodes, its number from the axis outwards, and how it moves."""
 
@@ -42,7 +42,7 @@ class _Sample:
 
 
 @dataclass(frozen=True)
-class _Edge:
+class Edge:
     """Where a mode begins or ceases to grow, or to be followed."""
 
     kind: str
@@ -51,12 +51,12 @@ class _Edge:
 
 
 @dataclass
-class _Mode:
+class Mode:
     """A mode that grows over a stretch of one branch: growth rates in units of Omega."""
 
-    start: _Edge
-    end: _Edge
-    samples: list[_Sample]
+    start: Edge
+    end: Edge
+    samples: list[Sample]
     sigma: list[complex]
 
 
@@ -132,28 +132,58 @@ def flutter_of(system: System, low: float, high: float) -> Flutter:
     -------
     Flutter
     """
-    path, end = Path(system.row(), low, ("gamma",)), float(np.log(high / low))
-    count = int(np.ceil(end / np.log1p(SPACING))) + 1
-    traced = trace(path, 0.0, end, at=np.linspace(0.0, end, max(2, count)))
-    follower = _Follower(system, path)
+    traced, follower = followed(system, low, high)
     windows: list[Window] = []
     counted = True
     for samples, began, ended in follower.branches(traced):
         counted &= all(sample.spectrum.status == status.OK for sample in samples)
         windows += follower.windows(follower.modes(samples, began, ended))
     return Flutter(
-        system, low, high, tuple(windows), traced.certain and counted, _looked_at(low, high, traced.certain, counted)
+        system, low, high, tuple(windows), traced.certain and counted, looked_at(low, high, traced.certain, counted)
     )
 
 
-def _looked_at(low: float, high: float, certain: bool, counted: bool) -> str:
+def followed(system: System, low: float, high: float) -> "tuple[Trace, Follower]":
+    """All shapes between two speeds, at speeds close enough for windows, and what follows their modes.
+
+    Parameters
+    ----------
+    system : System
+    low, high : float
+        Speeds [-], 0 < low < high.
+
+    Returns
+    -------
+    Trace
+    Follower
+    """
+    path, end = Path(system.row(), low, ("gamma",)), float(np.log(high / low))
+    count = int(np.ceil(end / np.log1p(SPACING))) + 1
+    traced = trace(path, 0.0, end, at=np.linspace(0.0, end, max(2, count)))
+    return traced, Follower(system, path)
+
+
+def looked_at(low: float, high: float, certain: bool, counted: bool) -> str:
+    """What was looked at, in words.
+
+    Parameters
+    ----------
+    low, high : float
+        Speeds [-].
+    certain, counted : bool
+        Whether all shapes were made out, and what grows was counted.
+
+    Returns
+    -------
+    str
+    """
     text = f"gamma {low:.6g} to {high:.6g}, at speeds {100 * SPACING:g} % apart at most: narrower windows may be missed"
     if not certain:
         text += "; not all shapes were made out"
     return text if counted else text + "; some shapes were not counted, and end their windows"
 
 
-class _Follower:
+class Follower:
     """Follows the modes of the shapes of one system from speed to speed."""
 
     def __init__(self, system: System, path: Path):
@@ -163,8 +193,8 @@ class _Follower:
     def speed(self, t: float) -> float:
         return float(self.path.gamma * np.exp(t))
 
-    def branches(self, traced: Trace) -> Iterator[tuple[list[_Sample], float | None, float | None]]:
-        """Samples of each branch, and where folds begin and end it."""
+    def branches(self, traced: Trace) -> Iterator[tuple[list[Sample], Fold | None, Fold | None]]:
+        """Samples of each branch, and the folds that begin and end it."""
         labels, columns = traced.branches(), traced.columns
         found: dict[int, list[tuple[int, int]]] = {}
         for i, column in enumerate(labels):
@@ -180,18 +210,18 @@ class _Follower:
             first, last = places[0][0], places[-1][0]
             before = traced.folds[first - 1] if first > 0 else None
             after = traced.folds[last] if last < len(columns) - 1 else None
-            yield samples, before.t if before else None, after.t if after else None
+            yield samples, before, after
 
-    def sample(self, t: float, x: float, place: int) -> _Sample:
+    def sample(self, t: float, x: float, place: int) -> Sample:
         ends = self.path.shots(np.array([x]), np.array([t]), self.path.jets(1))
         nodes = int(np.floor(ends.angle[0] / np.pi + 0.5))
-        return _Sample(t, x, nodes, place, Spectrum(self.system, self.speed(t), float(np.exp(x) / self.speed(t) ** 2)))
+        return Sample(t, x, nodes, place, Spectrum(self.system, self.speed(t), float(np.exp(x) / self.speed(t) ** 2)))
 
-    def between(self, a: _Sample, b: _Sample, t: float) -> _Sample:
+    def between(self, a: Sample, b: Sample, t: float) -> Sample:
         """The shape of the branch of two samples at a speed between them."""
         return self.sample(t, self.offset(a, b, t), a.place)
 
-    def offset(self, a: _Sample, b: _Sample, t: float) -> float:
+    def offset(self, a: Sample, b: Sample, t: float) -> float:
         """Log of the radius of the fish of that shape, by Newton's method."""
         x = a.x + (t - a.t) / (b.t - a.t) * (b.x - a.x)
         for _ in range(ROUNDS):
@@ -204,12 +234,12 @@ class _Follower:
                 break
         return x
 
-    def modes(self, samples: list[_Sample], began: float | None, ended: float | None) -> list[_Mode]:
+    def modes(self, samples: list[Sample], began: Fold | None, ended: Fold | None) -> list[Mode]:
         """Modes that grow somewhere on a branch."""
         first = samples[0]
-        kind, t = ("fold", began) if began is not None else ("range", first.t)
-        over: list[_Mode] = []
-        open_ = [_begun(_Edge(kind, t, float(s.imag)), first, complex(s)) for s in first.spectrum.growing]
+        kind, t = ("fold", began.t) if began is not None else ("range", first.t)
+        over: list[Mode] = []
+        open_ = [_begun(Edge(kind, t, float(s.imag)), first, complex(s)) for s in first.spectrum.growing]
         for a, b in pairwise(samples):
             known = a.spectrum.status == b.spectrum.status == status.OK
             old, new = [mode.sigma[-1] for mode in open_], [complex(s) for s in b.spectrum.growing]
@@ -217,29 +247,29 @@ class _Follower:
             going = {i for i, _ in pairs}
             for i, mode in enumerate(open_):
                 if i not in going:
-                    mode.end = self.edge(b, a, old[i]) if known else _Edge("unknown", a.t, old[i].imag)
+                    mode.end = self.edge(b, a, old[i]) if known else Edge("unknown", a.t, old[i].imag)
                     over.append(mode)
             for i, k in pairs:
                 open_[i].samples.append(b)
                 open_[i].sigma.append(new[k])
             open_ = [open_[i] for i, _ in pairs]
             for k in set(range(len(new))) - {k for _, k in pairs}:
-                start = self.edge(a, b, new[k]) if known else _Edge("unknown", b.t, new[k].imag)
+                start = self.edge(a, b, new[k]) if known else Edge("unknown", b.t, new[k].imag)
                 open_.append(_begun(start, b, new[k]))
-        kind, t = ("fold", ended) if ended is not None else ("range", samples[-1].t)
+        kind, t = ("fold", ended.t) if ended is not None else ("range", samples[-1].t)
         for mode in open_:
-            mode.end = _Edge(kind, t, mode.sigma[-1].imag)
+            mode.end = Edge(kind, t, mode.sigma[-1].imag)
         return over + open_
 
-    def edge(self, still: _Sample, growing: _Sample, sigma: complex) -> _Edge:
+    def edge(self, still: Sample, growing: Sample, sigma: complex) -> Edge:
         """Where a mode, that grows at one of two samples, begins to."""
         try:
             t, frequency = self.hopf(still, growing, sigma) if self.drag else self.krein(still, growing, sigma)
         except _LostError:
-            return _Edge("unknown", growing.t, sigma.imag)
-        return _Edge("hopf" if self.drag else "krein", t, frequency)
+            return Edge("unknown", growing.t, sigma.imag)
+        return Edge("hopf" if self.drag else "krein", t, frequency)
 
-    def hopf(self, still: _Sample, growing: _Sample, sigma: complex) -> tuple[float, float]:
+    def hopf(self, still: Sample, growing: Sample, sigma: complex) -> tuple[float, float]:
         """Where the growth of a mode is zero, by secants that keep their bracket."""
         damped = still.spectrum.roots.sigma[still.spectrum.roots.sigma.real <= 0.0]
         ends = [(still.t, _nearest(damped, sigma)), (growing.t, sigma)]
@@ -258,18 +288,18 @@ class _Follower:
                 break
         return t, here.imag
 
-    def mode(self, a: _Sample, b: _Sample, t: float, guess: complex) -> complex:
+    def mode(self, a: Sample, b: Sample, t: float, guess: complex) -> complex:
         """The growth rate next to a guess, of the shape between two samples."""
         speed = self.speed(t)
         r_f = np.array([np.exp(self.offset(a, b, t)) / speed**2])
         reach = max(reach_of(self.system, speed), 1.1 * abs(guess))
         motion = motions(r_f, np.array([speed]), self.system.row()[None], reach)[0]
         roots, found = polish(motion, np.array([guess]), np.array([guess]))
-        if not found[0]:
-            raise _LostError
-        return complex(roots.sigma[0])
+        if found[0] and abs(roots.sigma[0] - guess) < CLOSE:
+            return complex(roots.sigma[0])
+        return _nearest(self.between(a, b, t).spectrum.roots.sigma, guess)
 
-    def krein(self, still: _Sample, growing: _Sample, sigma: complex) -> tuple[float, float]:
+    def krein(self, still: Sample, growing: Sample, sigma: complex) -> tuple[float, float]:
         """Where two oscillations meet without drag: a zero of the square of half their distance."""
         ends = [still, growing]
         centre = sigma
@@ -292,7 +322,7 @@ class _Follower:
                 break
         return sample.t, centre.imag
 
-    def _height(self, sample: _Sample, centre: complex) -> float:
+    def _height(self, sample: Sample, centre: complex) -> float:
         speed = self.speed(sample.t)
         r_f = np.array([np.exp(sample.x) / speed**2])
         motion = motions(r_f, np.array([speed]), self.system.row()[None], 1.0 + abs(centre))[0]
@@ -302,9 +332,9 @@ class _Follower:
         one, other = near[np.argsort(np.abs(near - centre))[:2]]
         return float((((one - other) / 2.0) ** 2).real)
 
-    def windows(self, modes: list[_Mode]) -> Iterator[Window]:
+    def windows(self, modes: list[Mode]) -> Iterator[Window]:
         """A window a mode; one without an edge of its own goes with that which it is inside of."""
-        groups: list[list[_Mode]] = []
+        groups: list[list[Mode]] = []
         weak = {id(mode): max(s.real for s in mode.sigma) < WEAK for mode in modes}
         # Long ones first, strong ones before weak ones.
         for mode in sorted(modes, key=lambda mode: (weak[id(mode)], mode.start.t - mode.end.t)):
@@ -318,7 +348,7 @@ class _Follower:
         for group in sorted(groups, key=lambda group: group[0].start.t):
             yield self.window(group, weak=weak[id(group[0])])
 
-    def window(self, modes: list[_Mode], weak: bool) -> Window:
+    def window(self, modes: list[Mode], weak: bool) -> Window:
         """The window of the first of some modes."""
         first, last = modes[0].start, modes[0].end
         best, sample, growth = modes[0], modes[0].samples[0], 0.0
@@ -329,7 +359,7 @@ class _Follower:
         sample, growth = self._summit(best, sample, growth)
         low, high = self.speed(first.t), self.speed(last.t)
         return Window(
-            branch=self._name(sample),
+            branch=self.name(sample),
             nodes=sample.nodes,
             low=low,
             high=high,
@@ -342,7 +372,7 @@ class _Follower:
             weak=weak,
         )
 
-    def _summit(self, mode: _Mode, sample: _Sample, growth: float) -> tuple[_Sample, float]:
+    def _summit(self, mode: Mode, sample: Sample, growth: float) -> tuple[Sample, float]:
         """The largest growth between samples, where a parabola through three of them has its vertex."""
         k = mode.samples.index(sample)
         if not 0 < k < len(mode.samples) - 1:
@@ -363,7 +393,7 @@ class _Follower:
         rate = _nearest(there.spectrum.growing, mode.sigma[k]).real * self.speed(there.t)
         return (there, rate) if rate > growth else (sample, growth)
 
-    def _name(self, sample: _Sample) -> str:
+    def name(self, sample: Sample) -> str:
         """As of `Equilibria`."""
         if not self.system.in_vacuum:
             return f"shape {sample.place + 1}"
@@ -376,8 +406,8 @@ class _LostError(ArithmeticError):
     """A mode cannot be followed."""
 
 
-def _begun(start: _Edge, sample: _Sample, sigma: complex) -> _Mode:
-    return _Mode(start, start, [sample], [sigma])
+def _begun(start: Edge, sample: Sample, sigma: complex) -> Mode:
+    return Mode(start, start, [sample], [sigma])
 
 
 def _nearest(sigma: Complex, guess: complex) -> complex:

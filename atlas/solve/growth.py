@@ -117,11 +117,12 @@ class Spectrum:
     @property
     def kind(self) -> str:
         """As of `towatlas.results.Stability`."""
-        if self.status != status.OK:
-            return "unknown"
         if self.unstable == 0:
             return "stable"
-        leading = self.roots.sigma[0]
+        # What was found to grow does so, whether all that grow were counted or not.
+        leading = self.roots.sigma[0] if len(self.roots) else 0.0
+        if not leading.real > max(STILL, self.roots.error[0] if len(self.roots) else 0.0):
+            return "unknown"
         if leading.real < WEAK:
             return "weak"
         return "divergence" if leading.imag == 0.0 else "flutter"
