@@ -10,17 +10,21 @@ if TYPE_CHECKING:
     from towatlas.effort import TooMuchWork, patience
     from towatlas.limits import excess_length, massless_cable, threshold_length
     from towatlas.results import CriticalStates, Cusps, DragFolds, Equilibria, FishPositions, Folds
+    from towatlas.results_motion import Branch, Diagram, Flutter, Stability, Window
     from towatlas.scene.designs import design
     from towatlas.scene.file import read_scene
     from towatlas.scene.jumps import answer_scene
     from towatlas.scene.sweeps import sweep
     from towatlas.solve.critical import solve_critical
     from towatlas.solve.cusps import cusps
+    from towatlas.solve.diagram import diagram
     from towatlas.solve.drag_folds import solve_drag_folds
     from towatlas.solve.equilibria import equilibria
+    from towatlas.solve.flutter import flutter
     from towatlas.solve.folds import folds
     from towatlas.solve.many import equilibria_many
     from towatlas.solve.shapes import shape, shape_of
+    from towatlas.solve.stability import stability, stability_of
     from towatlas.system import System
     from towatlas.tables.atlas import Atlas, open_atlas
     from towatlas.tables.seal import AtlasFileError
@@ -29,20 +33,27 @@ __version__ = "0.1.0"
 __all__ = [
     "Atlas",
     "AtlasFileError",
+    "Branch",
     "CriticalStates",
     "Cusps",
+    "Diagram",
     "DragFolds",
     "Equilibria",
     "FishPositions",
+    "Flutter",
     "Folds",
+    "Stability",
     "System",
     "TooMuchWork",
+    "Window",
     "answer_scene",
     "cusps",
     "design",
+    "diagram",
     "equilibria",
     "equilibria_many",
     "excess_length",
+    "flutter",
     "folds",
     "massless_cable",
     "open_atlas",
@@ -52,6 +63,8 @@ __all__ = [
     "shape_of",
     "solve_critical",
     "solve_drag_folds",
+    "stability",
+    "stability_of",
     "sweep",
     "threshold_length",
 ]
@@ -60,18 +73,31 @@ __all__ = [
 _HOMES = {
     "effort": ("TooMuchWork", "patience"),
     "limits": ("excess_length", "massless_cable", "threshold_length"),
-    "results": ("CriticalStates", "Cusps", "DragFolds", "Equilibria", "FishPositions", "Folds"),
+    "results": (
+        "CriticalStates",
+        "Cusps",
+        "DragFolds",
+        "Equilibria",
+        "FishPositions",
+        "Flutter",
+        "Folds",
+        "Stability",
+        "Window",
+    ),
     "scene.designs": ("design",),
     "scene.file": ("read_scene",),
     "scene.jumps": ("answer_scene",),
     "scene.sweeps": ("sweep",),
     "solve.critical": ("solve_critical",),
     "solve.cusps": ("cusps",),
+    "solve.diagram": ("diagram",),
     "solve.drag_folds": ("solve_drag_folds",),
     "solve.equilibria": ("equilibria",),
+    "solve.flutter": ("flutter",),
     "solve.folds": ("folds",),
     "solve.many": ("equilibria_many",),
     "solve.shapes": ("shape", "shape_of"),
+    "solve.stability": ("stability", "stability_of"),
     "system": ("System",),
     "tables.atlas": ("Atlas", "open_atlas"),
     "tables.seal": ("AtlasFileError",),

@@ -96,7 +96,7 @@ class Reached(NamedTuple):
 
 
 @helper
-def _landing(c, pace, count, lane, remaining, h):
+def landing(c, pace, count, lane, remaining, h):
     """Step within h that pays out the remaining cable in a lane, by Newton inside a bracket."""
     low, high = 0.0, h
     s = 0.5 * h
@@ -121,7 +121,7 @@ def _landing(c, pace, count, lane, remaining, h):
 
 
 @helper
-def _past_axis(c, p, new, h, count, room):
+def past_axis(c, p, new, h, count, room):
     """Into room: how far steps have gone past the axis, above 1 where too far.
 
     Close by, g = T |V_n| and rho are all but absolute values of smooth functions, of which the series know one branch
@@ -151,7 +151,7 @@ def _began(x, y, new_x, new_y):
 
 
 @helper
-def _begin(shots, algebra, jobs, fresh, work, count):
+def begin_lanes(shots, algebra, jobs, fresh, work, count):
     """Start the shots of the lanes that are fresh."""
     c, scratch, p, ends, paid, low = work
     any_bare = any_fish = False
@@ -270,7 +270,7 @@ def shoot_drag(shots, algebra, max_steps, reached, begin, stop):
                 at += 1
                 filled = True
         if filled:
-            _begin(shots, algebra, jobs, fresh, work, count)
+            begin_lanes(shots, algebra, jobs, fresh, work, count)
         idle = False
         groups[ON_NORMAL] = groups[ON_TANGENT] = groups[ON_SIDE] = False
         for lane in range(LANES):
@@ -302,7 +302,7 @@ def shoot_drag(shots, algebra, max_steps, reached, begin, stop):
             remaining = (ends[lane] - paid[lane]) - low[lane]
             # As the length paid out may overflow where the cable ends long before the step does, in this order.
             if not h[lane] * room[2 * LANES + lane] < remaining:
-                h[lane] = _landing(c, p[PACE * count * LANES + lane], count, lane, remaining, h[lane])
+                h[lane] = landing(c, p[PACE * count * LANES + lane], count, lane, remaining, h[lane])
                 ended[lane] = True
         again = True
         while again:
@@ -316,7 +316,7 @@ def shoot_drag(shots, algebra, max_steps, reached, begin, stop):
             again = False
             if not groups[ACROSS]:
                 break
-            _past_axis(c, p, new, h, count, room)
+            past_axis(c, p, new, h, count, room)
             for lane in range(LANES):
                 past = room[lane] > 1.0 or (groups[ON_SIDE] and room[LANES + lane] > 1.0)
                 if past and jobs[lane] != IDLE:

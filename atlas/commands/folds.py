@@ -22,7 +22,7 @@ def add(commands: Any) -> None:
     add_cable(parser, gamma=False, any_medium=True)
     parser.add_argument(
         "--gamma",
-        type=_span,
+        type=span,
         required=True,
         metavar="LOW:HIGH",
         help="from which speed to which, Omega sqrt(R/g); both negative for a turn to port, as --gamma=-5:-1",
@@ -33,7 +33,21 @@ def add(commands: Any) -> None:
     parser.set_defaults(run=_run)
 
 
-def _span(text: str) -> tuple[float, float]:
+def span(text: str) -> tuple[float, float]:
+    """Two speeds of one sign, the lower first, as LOW:HIGH.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    (float, float)
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+    """
     try:
         low, high = (float(part) for part in text.split(":"))
     except ValueError:

@@ -107,12 +107,7 @@ def shoot(
     table[:] = systems
     if directions is not None:
         moved[:] = directions
-    upward = (table[:, W] < 0.0) | ((table[:, W] == 0.0) & (table[:, W_F] < 0.0))
-    port = speed < 0.0
-    for rows_of in (table, moved):
-        rows_of[upward, W] *= -1.0
-        rows_of[upward, W_F] *= -1.0
-        rows_of[upward != port, C_S] *= -1.0
+    upward, port = upright(table, speed, moved)
     state, steps = np.empty((rows, RESULT_ROWS, len(jets))), np.empty(rows, np.int64)
     turns, codes = np.empty((rows, 2), np.int64), np.empty(rows, np.int64)
     shots, algebra = Shots(r, np.square(speed), table, moved, part), Algebra(*jets.algebra)
@@ -133,6 +128,32 @@ def shoot(
     state[upward, 2] *= -1.0
     state[upward, 5] *= -1.0
     return Ends(*np.moveaxis(state, 1, 0), angle=angle, steps=steps, status=codes)  # type: ignore[misc]
+
+
+def upright(systems: Array, gamma: Array, *others: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Mirror systems, in place, so that they hang down and turn to starboard.
+
+    Parameters
+    ----------
+    systems : ndarray, shape (shots, columns)
+        As of `System.row`.
+    gamma : ndarray, shape (shots,)
+        Speed [-].
+    *others : ndarray, shape (shots, columns)
+        What is mirrored with them.
+
+    Returns
+    -------
+    upward, port : ndarray of bool, shape (shots,)
+        What was mirrored in z, and what in y.
+    """
+    upward = (systems[:, W] < 0.0) | ((systems[:, W] == 0.0) & (systems[:, W_F] < 0.0))
+    port = gamma < 0.0
+    for rows_of in (systems, *others):
+        rows_of[upward, W] *= -1.0
+        rows_of[upward, W_F] *= -1.0
+        rows_of[upward != port, C_S] *= -1.0
+    return upward, port
 
 
 def direction_of(names: Sequence[str], systems: Array) -> Array:

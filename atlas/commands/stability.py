@@ -1,0 +1,74 @@
+"""`towatlas stability`: which shapes of one cable at one speed last, and how fast the others are left."""
+
+import argparse
+from typing import Any
+
+from towatlas.commands.common import FAILED, OK, add_cable, add_fluid, add_patience, fluid, print_json, real, say
+from towatlas.kernels import status
+from towatlas.results_motion import Stability
+
+
+def add(commands: Any) -> None:
+    """Declare the command."""
+    parser = commands.add_parser(
+        "stability",
+        help="growth rates of small motions about each shape: stable, divergence or flutter",
+        description="For every shape in which a cable can be towed at one speed: the eigenvalue that grows most, or "
+        "damps least, as growth and frequency (radians) in sqrt(g/R), how many grow, and what that is called. "
+        "divergence: it leaves without turning; flutter: in growing swings; weak: below 0.01 gamma.",
+    )
+    add_cable(parser, any_medium=True)
+    add_fluid(parser)
+    parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
+    add_patience(parser)
+    parser.set_defaults(run=_run)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from towatlas.solve.stability import stability
+
+    found = stability(options.lam, options.wf, options.gamma, **fluid(options))
+    rows = [_row(found, k) for k in range(len(found))]
+    if options.json:
+        print_json(rows)
+    else:
+        _print_table(rows)
+    for k in range(len(found)):
+        if found.status[k] != status.OK:
+            say(f"{found.equilibria.branch[k]}: {found.sentence(k)}")
+    say(f"looked at: {found.looked_at}")
+    return OK if (found.status == status.OK).any() else FAILED
+
+
+def _row(found: Stability, k: int) -> dict[str, Any]:
+    shapes = found.equilibria
+    return {
+        "branch": str(shapes.branch[k]),
+        "R_x0": real(shapes.R_x0[k]),
+        "r_f": real(shapes.r_f[k]),
+        "nodes": int(shapes.nodes[k]),
+        "growth": real(found.growth[k]),
+        "frequency": real(found.frequency[k]),
+        "unstable": int(found.unstable[k]) if found.unstable[k] >= 0 else None,
+        "index": int(found.index[k]) if found.index[k] >= 0 else None,
+        "kind": str(found.kind[k]),
+        "error": real(found.error[k]),
+        "status": status.FLAG_MEANINGS.split()[int(found.status[k])],
+    }
+
+
+def _print_table(rows: list[dict[str, Any]]) -> None:
+    print(
+        f"{'branch':>8} {'R_x0':>20} {'r_f':>16} {'nodes':>5} {'growth':>18} {'frequency':>16} {'error':>8} "
+        f"{'unstable':>8} {'index':>5}  kind"
+    )
+    for row in rows:
+        growth, frequency, error = (
+            "-" if row[name] is None else format(row[name], style)
+            for name, style in (("growth", ".11g"), ("frequency", ".11g"), ("error", ".1e"))
+        )
+        unstable, index = ("-" if row[name] is None else row[name] for name in ("unstable", "index"))
+        print(
+            f"{row['branch']:>8} {row['R_x0']:>20.13g} {row['r_f']:>16.10g} {row['nodes']:>5} {growth:>18} "
+            f"{frequency:>16} {error:>8} {unstable:>8} {index:>5}  {row['kind']}"
+        )

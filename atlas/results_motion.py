@@ -1,0 +1,296 @@
+"""What the program answers about motions of a cable: which shapes last. All numbers are dimensionless unless said."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from towatlas.kernels import status as codes
+from towatlas.kernels.system import COLUMNS
+from towatlas.results import Array, Equilibria, Integers
+from towatlas.system import System
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class Stability:
+    """Growth rates of small motions about the equilibria of one cable at one speed, in the order of these.
+
+    Times are in sqrt(R/g). A motion grows as exp(growth t) and turns by frequency t.
+
+    Attributes
+    ----------
+    equilibria : Equilibria
+        The shapes.
+    growth, frequency : ndarray, shape (equilibria,)
+        Of the leading eigenvalue, that which grows most, or damps least, over sqrt(g/R) [-]; of several with the same
+        growth the slowest. Without drag the growth of what does not grow is 0. nan where status says why, and where
+        all is damped so strongly that none was found.
+    unstable : ndarray of int, shape (equilibria,)
+        Number of eigenvalues that grow by more than their error, >= 0, conjugate ones counted each; -1 if not counted.
+    index : ndarray of int, shape (equilibria,)
+        Without drag the number of directions in which the energy falls, >= 0; -1 with drag.
+    kind : ndarray of str, shape (equilibria,)
+        "stable"; "divergence" where the leading eigenvalue is real, "flutter" where it is one of a pair, "weak" where
+        it is below 0.01 gamma; "unknown" where not counted.
+    error : ndarray, shape (equilibria,)
+        Estimated absolute error of growth and frequency over sqrt(g/R) [-], > 0.
+    status : ndarray of int8, shape (equilibria,)
+        Codes of `towatlas.kernels.status`; `sentence` puts them in words.
+    eigenvalues : tuple of ndarray of complex, shape (equilibria,)
+        Of each shape those that were solved for, with frequencies >= 0, over sqrt(g/R) [-], the leading one first.
+    looked_at : str
+        Which were looked for.
+    """
+
+    equilibria: Equilibria
+    growth: Array
+    frequency: Array
+    unstable: Integers
+    index: Integers
+    kind: NDArray[np.str_]
+    error: Array
+    status: NDArray[np.int8]
+    eigenvalues: tuple[NDArray[np.complex128], ...]
+    looked_at: str
+
+    def __len__(self) -> int:
+        return len(self.growth)
+
+    def sentence(self, index: int) -> str:
+        """The status of one shape in words.
+
+        Parameters
+        ----------
+        index : int
+            Which shape.
+
+        Returns
+        -------
+        str
+        """
+        return codes.SENTENCES[int(self.status[index])]
+
+
+@dataclass(frozen=True)
+class Window:
+    """A range of speeds in which the shape of one branch does not last.
+
+    Attributes
+    ----------
+    branch : str
+        Name of the shape where it grows most, as of `Equilibria`.
+    nodes : int
+        Its nodes [-], >= 0.
+    low, high : float
+        Speeds Omega sqrt(R/g) [-], > 0.
+    low_kind, high_kind : str
+        What is there: "fold", where the branch begins or ends, "hopf", "krein", where two oscillations meet without
+        drag, "range", the end of what was looked at, or "unknown", where growth could not be counted.
+    low_frequency, high_frequency : float
+        Of the leading eigenvalue there, over sqrt(g/R) [-], >= 0.
+    growth : float
+        The largest, over sqrt(g/R) [-], > 0.
+    gamma : float
+        Where it is [-].
+    weak : bool
+        Whether it is below 0.01 gamma.
+    """
+
+    branch: str
+    nodes: int
+    low: float
+    high: float
+    low_kind: str
+    high_kind: str
+    low_frequency: float
+    high_frequency: float
+    growth: float
+    gamma: float
+    weak: bool
+
+
+@dataclass(frozen=True)
+class Flutter:
+    """Ranges of speed in which shapes of one cable do not last.
+
+    Attributes
+    ----------
+    system : System
+        The cable, its fish and the medium.
+    low, high : float
+        Speeds looked at [-], > 0.
+    windows : tuple of Window
+        Branch by branch.
+    complete : bool
+        Whether all shapes were made out and counted.
+    looked_at : str
+        In words.
+    """
+
+    system: System
+    low: float
+    high: float
+    windows: tuple[Window, ...]
+    complete: bool
+    looked_at: str
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a branch begins, ends or changes.
+
+    Attributes
+    ----------
+    kind : str
+        "fold", "hopf", "krein", "range" or "unknown", as of `Window`.
+    gamma : float
+        Speed Omega sqrt(R/g) [-], > 0.
+    x_f, r_f, z_f, tension : float
+        As of `Branch`; at a fold computed, elsewhere between samples 1 % apart.
+    """
+
+    kind: str
+    gamma: float
+    x_f: float
+    r_f: float
+    z_f: float
+    tension: float
+
+
+@dataclass(frozen=True, repr=False)
+class Branch:
+    """One branch of shapes over the speed.
+
+    Attributes
+    ----------
+    name : str
+        At its highest speed, as of `Equilibria`.
+    gamma : ndarray, shape (samples,)
+        Speeds Omega sqrt(R/g) [-], rising.
+    nodes : ndarray of int, shape (samples,)
+        Sign changes of x along the cable [-], >= 0.
+    x_f, r_f, z_f : ndarray, shape (samples,)
+        Position of the fish, its distance from the axis, its depth below the tow point, over tow radius [-].
+    tension : ndarray, shape (samples,)
+        At the tow point, over (mu + rho A) g R [-], > 0.
+    growth, frequency : ndarray, shape (samples,)
+        Of the leading eigenvalue over sqrt(g/R) [-].
+    unstable : ndarray of int, shape (samples,)
+        How many eigenvalues grow; -1 if not counted.
+    kind : ndarray of str, shape (samples,)
+        As of `Stability`.
+    points : tuple of Point
+        Where the branch begins, changes and ends, in rising speed.
+    between : tuple of str
+        The kind that it is of between each of them and the next.
+    """
+
+    name: str
+    gamma: Array
+    nodes: Integers
+    x_f: Array
+    r_f: Array
+    z_f: Array
+    tension: Array
+    growth: Array
+    frequency: Array
+    unstable: Integers
+    kind: NDArray[np.str_]
+    points: tuple[Point, ...]
+    between: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        text = f"Branch {self.name!r}: gamma {self.points[0].gamma:.6g} ({self.points[0].kind})"
+        for k, (kind, point) in enumerate(zip(self.between, self.points[1:], strict=True)):
+            # What goes on as it was is no change.
+            if k + 1 == len(self.between) or self.between[k + 1] != kind:
+                text += f" {kind} {point.gamma:.6g} ({point.kind})"
+        return text
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """All branches of shapes of one cable over its speed.
+
+    Attributes
+    ----------
+    system : System
+        The cable, its fish and the medium.
+    low, high : float
+        Speeds looked at [-], > 0.
+    branches : tuple of Branch
+        In the order of their lowest speeds, from the outermost inwards.
+    complete : bool
+        Whether all shapes were made out and counted.
+    looked_at : str
+        In words.
+    """
+
+    system: System
+    low: float
+    high: float
+    branches: tuple[Branch, ...]
+    complete: bool
+    looked_at: str
+
+    def to_dataset(self) -> "xarray.Dataset":
+        """The diagram as a dataset.
+
+        Returns
+        -------
+        xarray.Dataset
+            gamma, nodes, x_f, r_f, z_f, tension, growth, frequency, unstable and lasts over (branch, sample), nan or -1
+            beyond the last of a branch; lasts is 1 where the kind is "stable", 0 where it is another, -1 if unknown.
+            point_gamma and point_kind over (branch, point), name over branch.
+        """
+        import xarray
+
+        size = max(len(branch.gamma) for branch in self.branches)
+        points = max(len(branch.points) for branch in self.branches)
+
+        def filled(columns: list[Array], width: int, missing: float, kind: type) -> Array:
+            out: Array = np.full((len(columns), width), missing, kind)
+            for row, column in zip(out, columns, strict=True):
+                row[: len(column)] = column
+            return out
+
+        variables: dict[str, Any] = {}
+        for name, text in _DIAGRAM.items():
+            whole = name in ("nodes", "unstable")
+            columns = [getattr(branch, name) for branch in self.branches]
+            data = filled(columns, size, -1 if whole else np.nan, np.int32 if whole else np.float64)
+            variables[name] = (("branch", "sample"), data, {"long_name": text, "units": "1"})
+        lasts = [np.where(b.kind == "unknown", -1, (b.kind == "stable").astype(int)) for b in self.branches]
+        about = {"long_name": "whether the shape lasts, -1 if not known", "units": "1"}
+        variables["lasts"] = (("branch", "sample"), filled(lasts, size, -1, np.int8), about)
+        speeds = [np.array([point.gamma for point in branch.points]) for branch in self.branches]
+        about = {"long_name": "speed at which the branch begins, changes or ends", "units": "1"}
+        variables["point_gamma"] = (("branch", "point"), filled(speeds, points, np.nan, np.float64), about)
+        kinds = [[point.kind for point in b.points] + [""] * (points - len(b.points)) for b in self.branches]
+        variables["point_kind"] = (("branch", "point"), np.array(kinds, np.str_), {"long_name": "what is there"})
+        names = np.array([branch.name for branch in self.branches], np.str_)
+        variables["name"] = (("branch",), names, {"long_name": "name of the branch at its highest speed"})
+        facts = {name: getattr(self.system, name) for name in COLUMNS}
+        attributes = {
+            "title": "Branches of shapes of a towed cable",
+            "Conventions": "CF-1.11",
+            "looked_at": self.looked_at,
+        }
+        return xarray.Dataset(variables, attrs=attributes | facts)
+
+
+_DIAGRAM = {
+    "gamma": "speed Omega sqrt(R/g)",
+    "nodes": "sign changes of x along the cable",
+    "x_f": "position of the fish over tow radius",
+    "r_f": "distance of the fish from the axis over tow radius",
+    "z_f": "depth of the fish below the tow point over tow radius",
+    "tension": "tension at the tow point over (mu + rho A) g R",
+    "growth": "growth of the leading eigenvalue over sqrt(g/R)",
+    "frequency": "frequency of the leading eigenvalue over sqrt(g/R)",
+    "unstable": "number of eigenvalues that grow, -1 if not counted",
+}

@@ -1,0 +1,147 @@
+"""Bifurcation diagrams: all branches of shapes of one cable over its speed, with what lasts and where that changes."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from towatlas.checks import check_speed
+from towatlas.effort import patience
+from towatlas.kernels import status
+from towatlas.results_motion import Array, Branch, Diagram, Point
+from towatlas.solve.drag_equilibria import quantities
+from towatlas.solve.flutter import Follower, Sample, followed, looked_at
+from towatlas.solve.paths import Fold
+from towatlas.system import System
+
+if TYPE_CHECKING:
+    from towatlas.solve.flutter import Mode
+
+SHOWN = ("x_f", "r_f", "z_f", "tension")
+
+
+def diagram(
+    lam: float,
+    w_f: float,
+    gamma: Sequence[float],
+    *,
+    C: float = 0.0,
+    m_f: float | None = None,
+    C_f: float = 0.0,
+    w: float = 1.0,
+    C_t: float = 0.0,
+) -> Diagram:
+    """All branches of shapes of a towed cable between two speeds, with what lasts.
+
+    Parameters
+    ----------
+    lam : float
+        Cable length over tow radius [-], > 0.
+    w_f : float
+        Fish weight over (mu + rho A) g R [-].
+    gamma : (float, float)
+        From which speed Omega sqrt(R/g) to which [-], > 0.
+    C, m_f, C_f, w, C_t : float
+        The fluid, as in `equilibria`; a vacuum by default.
+
+    Returns
+    -------
+    Diagram
+
+    Raises
+    ------
+    ValueError
+        For numbers out of range.
+    ArithmeticError
+        If shapes cannot be computed, or the work takes longer than `towatlas.patience` allows (TooMuchWork).
+
+    Examples
+    --------
+    >>> diagram(10, 1, (0.3, 0.6)).branches[0]
+    Branch 'outward': gamma 0.3 (range) stable 0.6 (range)
+    """
+    low, high = (check_speed(speed) for speed in gamma)
+    if not 0.0 < low < high:
+        raise ValueError(f"gamma must be two positive speeds, the lower first, got {gamma!r}")
+    with patience():
+        return diagram_of(System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t), low, high)
+
+
+def diagram_of(system: System, low: float, high: float) -> Diagram:
+    """As `diagram`, of a system already checked.
+
+    Parameters
+    ----------
+    system : System
+        Without side force.
+    low, high : float
+        Speeds [-], 0 < low < high.
+
+    Returns
+    -------
+    Diagram
+    """
+    traced, follower = followed(system, low, high)
+    branches, counted = [], True
+    for samples, began, ended in follower.branches(traced):
+        counted &= all(sample.spectrum.status == status.OK for sample in samples)
+        modes = follower.modes(samples, began, ended)
+        branches.append(_branch(follower, samples, modes, began, ended))
+    order = sorted(branches, key=lambda branch: (branch.gamma[0], -branch.r_f[-1]))
+    certain = traced.certain and counted
+    return Diagram(system, low, high, tuple(order), certain, looked_at(low, high, traced.certain, counted))
+
+
+def _branch(
+    follower: Follower, samples: list[Sample], modes: "list[Mode]", began: Fold | None, ended: Fold | None
+) -> Branch:
+    speeds = np.array([follower.speed(sample.t) for sample in samples])
+    columns = _columns(follower, np.array([sample.x for sample in samples]), speeds)
+    leading = np.array([sample.spectrum.roots.sigma[0] if len(sample.spectrum.roots) else np.nan for sample in samples])
+    kinds = np.array([sample.spectrum.kind for sample in samples], np.str_)
+
+    def point(kind: str, gamma: float, fold: Fold | None = None) -> Point:
+        if fold is None:
+            values = {name: float(np.interp(gamma, speeds, columns[name])) for name in SHOWN}
+        else:
+            found = _columns(follower, np.array([fold.x]), np.array([gamma]))
+            values = {name: float(found[name][0]) for name in SHOWN}
+        return Point(kind, gamma, **values)
+
+    ends = []
+    for fold, sample in ((began, samples[0]), (ended, samples[-1])):
+        ends.append(point("range" if fold is None else "fold", follower.speed((fold or sample).t), fold))
+    edges = {(edge.kind, edge.t) for mode in modes for edge in (mode.start, mode.end)}
+    inner = [point(kind, follower.speed(t)) for kind, t in edges if kind in ("hopf", "krein", "unknown")]
+    points = [ends[0], *sorted(inner, key=lambda one: one.gamma), ends[1]]
+    return Branch(
+        name=follower.name(samples[-1]),
+        gamma=speeds,
+        nodes=columns["nodes"],
+        **{name: columns[name] for name in SHOWN},
+        growth=leading.real * speeds,
+        frequency=leading.imag * speeds,
+        unstable=np.array([sample.spectrum.unstable for sample in samples]),
+        kind=kinds,
+        points=tuple(points),
+        between=tuple(_between(speeds, kinds, points)),
+    )
+
+
+def _columns(follower: Follower, x: Array, speeds: Array) -> dict[str, Any]:
+    rows = np.tile(follower.system.row(), (len(x), 1))
+    return quantities(np.arange(len(x)), x, rows, speeds)
+
+
+def _between(speeds: Array, kinds: NDArray[np.str_], points: list[Point]) -> list[str]:
+    """The kind that most samples have between each point and the next, the nearest where there is none."""
+    found = []
+    for low, high in pairwise(points):
+        inside = kinds[(speeds >= low.gamma) & (speeds <= high.gamma)]
+        if not len(inside):
+            inside = kinds[[int(np.argmin(np.abs(speeds - 0.5 * (low.gamma + high.gamma))))]]
+        names, counts = np.unique(inside, return_counts=True)
+        found.append(str(names[np.argmax(counts)]))
+    return found

@@ -1,0 +1,247 @@
+"""Guesses of the growth rates of small motions: Galerkin's method with polynomials on panels of the cable.
+
+The slope of the perturbation is written in two unit vectors across the cable, times Legendre polynomials of the arc
+length that are independent of one panel to the next, so that the cable keeps its length; the perturbation is its
+integral from the tow point down. Conditions at the fish are natural ones. With M, G, K the matrices of
+sigma^2 M + sigma G + K, M is symmetric and positive definite, and so is K in a vacuum but for as many directions as the
+index says.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from towatlas.effort import check_foreseen
+from towatlas.kernels.variation import TERMS
+from towatlas.solve.motion import Array, Complex, Integers, Motion
+
+# Gauss nodes a panel beyond the degree.
+NODES = 6
+# CPU time over the cube of the number of unknowns, measured with 800 to 5500 of them, s.
+SECONDS_A_CUBE = 7e-10
+REMEDY = "a shorter cable or a lower speed has fewer nodes"
+# Rounds of Newton to their places.
+NEWTON = 12
+# By how much the angle of the cable, the phase of its waves and the logarithm of its tension may change in a panel.
+PANEL = 5.0
+DEGREE = 8
+# Modes of K that are kept: those up to so many times (reach + 1)^2, and at least so many.
+BEYOND, LEAST = 3.0, 16
+S = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+PULL = np.diag([1.0, 2.0, 1.0])  # 1 + e_y e_y^T: drag of the fish
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Approximate modes of a motion, in the upper half of the plane.
+
+    Attributes
+    ----------
+    sigma : ndarray of complex, shape (modes,)
+        Growth rates in units of Omega.
+    energy : ndarray, shape (modes,)
+        Energy of the mode in the rotating frame over that of its motion [-]: negative where friction would make an
+        oscillation grow; of meaning without drag only.
+    index : int
+        Number of directions in which the energy falls.
+    """
+
+    sigma: Complex
+    energy: Array
+    index: int
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """Functions on a panel, at its Gauss nodes, and what they weigh.
+
+    Attributes
+    ----------
+    slope, eta : ndarray, shape (nodes, 3, functions)
+        Slopes, and what they move the cable by, from the upper end of the panel down.
+    end : ndarray, shape (3, functions)
+        What they move all that is below by.
+    length, tension : ndarray, shape (nodes,)
+        Weights in arc length, and the tension.
+    mass, friction, force, bend : ndarray, shape (nodes, 3, 3)
+        Weighted with the length: 1, 2 S + A, S S + A S, and E P.
+    """
+
+    slope: Array
+    eta: Array
+    end: Array
+    length: Array
+    tension: Array
+    mass: Array
+    friction: Array
+    force: Array
+    bend: Array
+
+
+def modes(motion: Motion, refined: int = 0) -> Modes:
+    """Modes of a small motion with |sigma| up to its reach, and others.
+
+    Parameters
+    ----------
+    motion : Motion
+    refined : int
+        How often the panels are made shorter and the degree higher, >= 0.
+
+    Returns
+    -------
+    Modes
+    """
+    degree, panel = DEGREE + 3 * refined, PANEL / 1.5**refined
+    unknowns = 2 * (degree + 1) * int(_panel_of_step(motion, panel)[-1] + 1)
+    check_foreseen(SECONDS_A_CUBE * unknowns**3, f"modes of {unknowns} unknowns", REMEDY)
+    mass, friction, stiffness = matrices(motion, degree, panel)
+    # With the mass as unit.
+    inverse = np.linalg.inv(np.linalg.cholesky(mass))
+    friction, stiffness = inverse @ friction @ inverse.T, inverse @ stiffness @ inverse.T
+    curvature, basis = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
+    kept = max(LEAST, int(np.searchsorted(curvature, BEYOND * 2.0**refined * (motion.reach + 1.0) ** 2)))
+    basis = basis[:, :kept]
+    friction, stiffness = basis.T @ friction @ basis, basis.T @ stiffness @ basis
+    size = len(friction)
+    first_order = np.block([[np.zeros((size, size)), np.eye(size)], [-stiffness, -friction]])
+    sigma, vectors = np.linalg.eig(first_order)
+    upper = sigma.imag >= 0.0
+    sigma, vectors = sigma[upper], vectors[:size, upper]
+    moving = np.square(np.abs(vectors)).sum(0)
+    held = np.einsum("im,ij,jm->m", vectors.conj(), stiffness, vectors).real / moving
+    motion_energy = np.square(np.abs(sigma))
+    return Modes(sigma, (motion_energy + held) / (motion_energy + np.abs(held)), int((curvature < 0.0).sum()))
+
+
+def matrices(motion: Motion, degree: int, panel: float) -> tuple[Array, Array, Array]:
+    """Matrices of sigma^2 M + sigma G + K.
+
+    Parameters
+    ----------
+    motion : Motion
+    degree : int
+        Of the polynomials, >= 1.
+    panel : float
+        As `PANEL`.
+
+    Returns
+    -------
+    M, G, K : ndarray, shape (unknowns, unknowns)
+    """
+    panels = list(_panels(motion, degree, panel))
+    size = panels[0].end.shape[1]
+    unknowns = size * len(panels)
+    # A bare tip is left out of the steps: so much cable.
+    mass, pull = motion.fish[0] + motion.start[0] * motion.start[1], motion.fish[1] * PULL
+    # What is below a panel moves as one; the fish is the last of it. From the fish up.
+    below = [mass * np.eye(3), 2.0 * mass * S + pull, (mass * S + pull) @ S]
+    all_of = [np.zeros((unknowns, unknowns)) for _ in below]
+    ends, right, left = np.zeros((3, unknowns)), np.zeros((3, 3, unknowns)), np.zeros((3, 3, unknowns))
+    for j, part in enumerate(panels):
+        at = slice(j * size, (j + 1) * size)
+        ends[:, at] = part.end
+        for i, weight in enumerate((part.mass, part.friction, part.force)):
+            moved, back = weight @ part.eta, np.swapaxes(weight, 1, 2) @ part.eta
+            all_of[i][at, at] = _product(part.eta, moved) + part.end.T @ below[i] @ part.end
+            # With those above, which here move by their ends.
+            right[i][:, at] = moved.sum(0) + below[i] @ part.end
+            left[i][:, at] = back.sum(0) + below[i].T @ part.end
+            below[i] = below[i] + weight.sum(0)
+        bent = part.bend @ part.slope
+        stretched = (part.length * part.tension)[:, None, None] * part.slope
+        all_of[2][at, at] += _product(part.slope, stretched) - _product(part.eta, bent)
+        right[2][:, at] -= bent.sum(0)
+    number = np.repeat(np.arange(len(panels)), size)
+    higher = number[:, None] > number
+    for i, full in enumerate(all_of):
+        full += np.where(higher, ends.T @ right[i], 0.0) + np.where(higher.T, left[i].T @ ends, 0.0)
+    return all_of[0], all_of[1], all_of[2]
+
+
+def _product(one: Array, other: Array) -> Array:
+    return np.tensordot(one, other, ((0, 1), (0, 1)))
+
+
+def _panels(motion: Motion, degree: int, panel: float) -> Iterator[_Panel]:
+    """From the fish up."""
+    of_step = _panel_of_step(motion, panel)
+    share, weights, integrals = _rule(degree + NODES)
+    # From the upper end of the panel down.
+    polynomials: Array = legendre.legvander(1.0 - 2.0 * share, degree)[:, None, :].astype(float)
+    for j in range(of_step[-1] + 1):
+        steps = np.flatnonzero(of_step == j)
+        k, part, whole = _places(motion, steps, share)
+        values = np.einsum("qro,qo->qr", motion.series[k], part[:, None] ** np.arange(TERMS))
+        P, TA, EP = (values[:, 1 + 9 * i : 10 + 9 * i].reshape(-1, 3, 3) for i in range(3))
+        length, tension = whole * weights, values[:, 0]
+        slope = _slopes(P, polynomials)
+        drag, own = (length / tension)[:, None, None] * TA, length[:, None, None]
+        yield _Panel(
+            slope,
+            np.einsum("qj,jid->qid", whole * integrals, slope),
+            np.einsum("q,qid->id", length, slope),
+            length,
+            tension,
+            own * np.eye(3),
+            own * 2.0 * S + drag,
+            (own * S + drag) @ S,
+            own * EP,
+        )
+
+
+def _places(motion: Motion, steps: Integers, share: Array) -> tuple[Integers, Array, float]:
+    """Where shares of the length of some steps are: number and part of the step; and that length."""
+    lengths = motion.series[:, 0] / np.arange(1, TERMS + 1) * motion.sizes[:, None]
+    borders = np.concatenate([[0.0], np.cumsum(lengths[steps].sum(1))])
+    target = borders[-1] * share
+    k = np.clip(np.searchsorted(borders, target, side="right") - 1, 0, len(steps) - 1)
+    target, k = target - borders[k], steps[k]
+    powers = np.arange(TERMS)
+    low, high = np.zeros(len(share)), np.ones(len(share))
+    part = np.full(len(share), 0.5)
+    for _ in range(NEWTON):
+        all_of = part[:, None] ** powers
+        miss = (lengths[k] * all_of).sum(1) * part - target
+        low, high = np.where(miss < 0.0, part, low), np.where(miss < 0.0, high, part)
+        trial = part - miss / ((motion.series[k, 0] * all_of).sum(1) * motion.sizes[k])
+        part = np.where((trial >= low) & (trial <= high), trial, 0.5 * (low + high))
+    return k, part, float(borders[-1])
+
+
+def _panel_of_step(motion: Motion, panel: float) -> Integers:
+    """Numbers of the panels that the steps belong to, from 0."""
+    series = motion.series
+    start, end = series[:, :10, 0], series[:, :10].sum(-1)
+    length = motion.sizes * 0.5 * (start[:, 0] + end[:, 0])
+    turn = np.sqrt(0.5 * np.square(end[:, 1:] - start[:, 1:]).sum(1))
+    phase = (1.0 + motion.reach) * motion.sizes * np.sqrt(0.5 * (start[:, 0] + end[:, 0]))
+    change = 2.0 * turn + np.abs(np.log(end[:, 0] / start[:, 0])) + phase + length / length.sum()
+    reached = np.cumsum(change)
+    count = int(np.ceil(reached[-1] / panel))
+    number = np.minimum(((reached - 0.5 * change) / reached[-1] * count).astype(int), count - 1)
+    return np.unique(number, return_inverse=True)[1]
+
+
+@cache
+def _rule(nodes: int) -> tuple[Array, Array, Array]:
+    """Gauss nodes and weights on [0, 1], and integrals from each node to 1 of the polynomials that are 1 at one."""
+    x, w = legendre.leggauss(nodes)
+    out = np.empty((len(x), len(x)))
+    for j in range(len(x)):
+        series = legendre.legint(legendre.legfit(x, np.eye(len(x))[j], len(x) - 1))
+        out[:, j] = 0.5 * (legendre.legval(1.0, series) - legendre.legval(x, series))
+    return 0.5 * (x + 1.0), 0.5 * w, out
+
+
+def _slopes(P: Array, polynomials: Array) -> Array:
+    """Two unit vectors across the cable, times polynomials: shape (nodes, 3, functions)."""
+    first, second = np.linalg.eigh(P[len(P) // 2])[1][:, [2, 1]].T
+    n = P @ first
+    n /= np.linalg.norm(n, axis=-1, keepdims=True)
+    b = P @ second
+    b -= n * (n * b).sum(-1, keepdims=True)
+    b /= np.linalg.norm(b, axis=-1, keepdims=True)
+    return np.concatenate([n[..., None] * polynomials, b[..., None] * polynomials], axis=-1)

@@ -1,0 +1,195 @@
+"""Growth rates of one shape, and how many of them grow."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from towatlas.effort import check_patience
+from towatlas.kernels import status
+from towatlas.solve.galerkin import Modes, modes
+from towatlas.solve.motion import Array, Complex, Motion, motions
+from towatlas.solve.spectrum import Roots, count_growing, zeros_near
+from towatlas.system import System
+
+# |sigma| looked at, in units of Omega, without drag, where nothing beyond 1 grows, and with it; the latter rises by so
+# many times the frequency of a hanging cable of this length, without which slow circles would see none of its modes.
+REACH_CONSERVED, REACH, HANGING = 1.0, 3.0, 2.0
+# Modes that damp faster than this, and than the leading one by this, are left as Galerkin's method has them, in units
+# of Omega.
+DAMPED = 0.1
+# Below this, in units of Omega, growth is weak.
+WEAK = 0.01
+# Growth that rounding cannot be told from.
+STILL = 1e-13
+# Growth of a mode of Galerkin's that may be its error, and one that cannot; modes nearer to each other than this may
+# meet within its error.
+NOTHING, PLAINLY, MEETING = 1e-7, 1e-3, 0.02
+REFINEMENTS = 4
+REMEDY = "a shorter cable or a lower speed has fewer shapes and nodes"
+
+
+def reach_of(system: System, gamma: float) -> float:
+    """Size of the growth rates that are looked at.
+
+    Parameters
+    ----------
+    system : System
+    gamma : float
+        Speed [-].
+
+    Returns
+    -------
+    float
+        In units of Omega.
+    """
+    return REACH + HANGING / (abs(gamma) * np.sqrt(system.lam)) if has_drag(system) else REACH_CONSERVED
+
+
+def has_drag(system: System) -> bool:
+    """Whether motion is damped.
+
+    Parameters
+    ----------
+    system : System
+
+    Returns
+    -------
+    bool
+    """
+    return bool(system.C or system.C_f or system.C_t)
+
+
+class Spectrum:
+    """Growth rates of one shape, in units of Omega, and how many grow.
+
+    Parameters
+    ----------
+    system : System
+        Without side force.
+    gamma : float
+        Speed [-].
+    r_f : float
+        Distance of the fish from the axis over tow radius [-], > 0.
+    index : int
+        In a vacuum the number of directions in which the energy falls; -1 if not known.
+
+    Attributes
+    ----------
+    roots : Roots
+        The leading one first.
+    unstable : int
+        How many grow, conjugate ones counted each; -1 if not counted.
+    index : int
+        Without drag as above.
+    status : int
+        A code of `towatlas.kernels.status`.
+    """
+
+    def __init__(self, system: System, gamma: float, r_f: float, index: int = -1):
+        self.drag = has_drag(system)
+        self.index = index
+        self.roots = Roots(np.empty(0, np.complex128), np.empty(0))
+        self.unstable = -1
+        self.motion = lambda reach: motions(np.array([r_f]), np.array([gamma]), system.row()[None], reach)[0]
+        motion = self.motion(reach_of(system, gamma))
+        self.status = motion.status
+        if motion.status != status.OK:
+            return
+        for refined in range(REFINEMENTS):
+            check_patience("growth rates", REMEDY)
+            guesses = modes(motion, refined)
+            if self._counted(motion, guesses):
+                self.status = status.OK
+                return
+            self.status = status.NOT_COUNTED
+            if motion.fastest_flow > 1.0:
+                self.status = status.FLOW_OUTRUNS_WAVES
+                return
+        if self.drag and not len(self.roots) and count_growing(motion, self.roots.sigma) == 0:
+            # All is damped so strongly that Galerkin's method is no guess.
+            self.status, self.unstable = status.OK, 0
+
+    @property
+    def growing(self) -> Complex:
+        """Those that grow, with frequencies >= 0, where they were counted."""
+        sigma = self.roots.sigma
+        return sigma[sigma.real > np.maximum(self.roots.error, STILL)] if self.unstable > 0 else sigma[:0]
+
+    @property
+    def kind(self) -> str:
+        """As of `towatlas.results.Stability`."""
+        if self.unstable == 0:
+            return "stable"
+        # What was found to grow does so, whether all that grow were counted or not.
+        leading = self.roots.sigma[0] if len(self.roots) else 0.0
+        if not leading.real > max(STILL, self.roots.error[0] if len(self.roots) else 0.0):
+            return "unknown"
+        if leading.real < WEAK:
+            return "weak"
+        return "divergence" if leading.imag == 0.0 else "flutter"
+
+    def _slowest(self, motion: Motion, guesses: Modes) -> Roots:
+        """Where nothing grows: the slowest mode."""
+        size = np.abs(guesses.sigma)
+        slowest = size == size.min()
+        if size.min() > motion.reach:
+            motion = self.motion(1.1 * size.min())
+        return zeros_near(motion, guesses, slowest)
+
+    def _counted(self, motion: Motion, guesses: Modes) -> bool:
+        return self._by_contour(motion, guesses) if self.drag else self._by_energy(motion, guesses)
+
+    def _by_energy(self, motion: Motion, guesses: Modes) -> bool:
+        """Without drag: real pairs, quadruples and oscillations of negative energy account for the index."""
+        sigma, energy = guesses.sigma, guesses.energy
+        right = sigma.real > NOTHING
+        real = right & (np.abs(sigma.imag) < NOTHING)
+        turning = np.abs(sigma.real) <= NOTHING
+        negative = turning & (energy < 0.0)
+        # Oscillations of either energy next to each other may be a quadruple, and the other way round.
+        meeting = negative & (_to_nearest(sigma, turning & (energy > 0.0)) < MEETING)
+        index = self.index if self.index >= 0 else guesses.index
+        accounted = int(real.sum()) + 2 * int((right & ~real).sum()) + 2 * int(negative.sum())
+        if guesses.index != index or accounted != index:
+            return False
+        if self.index < 0:
+            self.index = index
+        roots = zeros_near(motion, guesses, right | meeting)
+        grows = roots.sigma.real > np.maximum(roots.error, STILL)
+        some = Roots(roots.sigma[grows], roots.error[grows])
+        if not grows.any():
+            some = self._slowest(motion, guesses)
+            some = Roots(some.sigma - some.sigma.real, some.error)
+        self.roots = some
+        self.unstable = int(np.where(some.sigma.imag == 0.0, 1, 2)[: grows.sum()].sum())
+        # What plainly grows must be among them, and what does not comes in twos.
+        plain = sigma[sigma.real > PLAINLY]
+        least = int(np.where(np.abs(plain.imag) < NOTHING, 1, 2).sum())
+        return least <= self.unstable <= index and (index - self.unstable) % 2 == 0
+
+    def _by_contour(self, motion: Motion, guesses: Modes) -> bool:
+        """With drag: as many zeros in the half disc as are known."""
+        sigma = guesses.sigma
+        near = np.abs(sigma) < 1.1 * motion.reach
+        if near.any():
+            damped = min(-DAMPED, sigma.real[near].max() - DAMPED)
+            roots = zeros_near(motion, guesses, near & (sigma.real > damped))
+        else:
+            damped = -np.inf
+            roots = self._slowest(motion, guesses)
+        if not len(roots):
+            return False
+        self.roots = roots
+        if motion.fastest_flow > 1.0:
+            return False
+        grows = (roots.sigma.real > np.maximum(roots.error, STILL)) & (np.abs(roots.sigma) < motion.reach)
+        self.unstable = int(np.where(roots.sigma[grows].imag == 0.0, 1, 2).sum())
+        known = np.concatenate([roots.sigma, sigma[near & (sigma.real <= damped)]])
+        count = count_growing(motion, known)
+        inside = roots.sigma[(roots.sigma.real > 0.0) & (np.abs(roots.sigma) < motion.reach)]
+        return count == int(np.where(inside.imag == 0.0, 1, 2).sum())
+
+
+def _to_nearest(sigma: Complex, among: NDArray[np.bool_]) -> Array:
+    if not among.any():
+        return np.full(len(sigma), np.inf)
+    return np.abs(sigma[:, None] - sigma[among]).min(axis=1)

@@ -1,0 +1,157 @@
+"""Which shapes last: growth rates of small motions about the equilibria of one cable at one speed."""
+
+from math import inf
+
+import numpy as np
+
+from towatlas.checks import check_speed
+from towatlas.effort import check_patience, patience
+from towatlas.kernels import status
+from towatlas.results import Equilibria
+from towatlas.results_motion import Stability
+from towatlas.solve.equilibria import solve_equilibria
+from towatlas.solve.growth import REMEDY, Spectrum, has_drag, reach_of
+from towatlas.system import System
+
+
+def stability(
+    lam: float,
+    w_f: float,
+    gamma: float,
+    *,
+    C: float = 0.0,
+    m_f: float | None = None,
+    C_f: float = 0.0,
+    w: float = 1.0,
+    C_t: float = 0.0,
+    C_s: float = 0.0,
+    b_s: float = inf,
+) -> Stability:
+    """Growth rates of small motions about every equilibrium of a towed cable.
+
+    Parameters
+    ----------
+    lam : float
+        Cable length over tow radius [-], > 0.
+    w_f : float
+        Fish weight over (mu + rho A) g R [-].
+    gamma : float
+        Rotational frequency Omega sqrt(R/g) [-].
+    C, m_f, C_f, w, C_t, C_s, b_s : float
+        The fluid, as in `equilibria`; a vacuum by default. With a side force there is a status in place of an answer.
+
+    Returns
+    -------
+    Stability
+
+    Raises
+    ------
+    ValueError
+        For numbers out of range, and what is not one number.
+    ArithmeticError
+        If the shapes cannot be computed, or the work takes longer than `towatlas.patience` allows (TooMuchWork).
+
+    Notes
+    -----
+    The motion is that of NRL Report 7048, Eqs. (12), (15b), linearised, seen from the turning tow point. Growth
+    rates are zeros of the Evans function D(sigma) = det eta at the tow point of three solutions from the fish up. That
+    none is missed: without drag all that grow have |sigma| <= gamma, and the pairs, quadruples and oscillations of
+    negative energy add up to the number of directions in which the energy falls, in a vacuum the nodes and the zeros of
+    dp/da along the shape; with drag by the argument principle in |sigma| < 3 gamma, which is not proved to hold all.
+
+    Examples
+    --------
+    >>> found = stability(37.8, 1352, 5.94, C=0.018)
+    >>> [str(kind) for kind in found.kind], [int(n) for n in found.unstable]
+    (['divergence', 'flutter', 'stable'], [1, 2, 0])
+    >>> round(float(found.growth[1]), 6), round(float(found.frequency[1]), 5)
+    (0.15222, 2.56185)
+    """
+    system = System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t, C_s=C_s, b_s=b_s)
+    with patience():
+        return stability_of(solve_equilibria(system, check_speed(gamma)))
+
+
+def stability_of(found: Equilibria) -> Stability:
+    """Growth rates of small motions about equilibria that are known.
+
+    Parameters
+    ----------
+    found : Equilibria
+        From `towatlas.equilibria`.
+
+    Returns
+    -------
+    Stability
+        In the order of the equilibria.
+
+    Raises
+    ------
+    TooMuchWork
+        If the work takes longer than `towatlas.patience` allows.
+
+    Examples
+    --------
+    >>> from towatlas import equilibria
+    >>> [str(kind) for kind in stability_of(equilibria(2.5, 0.0, 2.534)).kind]
+    ['divergence', 'flutter', 'stable']
+    """
+    count, system = len(found), found.system
+    speed = abs(found.gamma)
+    growth, frequency, error = (np.full(count, np.nan) for _ in range(3))
+    unstable, index = np.full(count, -1), np.full(count, -1)
+    codes = np.full(count, status.OK, np.int8)
+    kinds, sigmas = ["unknown"] * count, [np.empty(0, np.complex128)] * count
+    if system.C_s != 0.0:
+        codes[:] = status.NO_THEORY
+    with patience():
+        for k in np.flatnonzero(codes == status.OK):
+            check_patience("growth rates of the shapes", REMEDY, done=int(k), of=count)
+            energy = index_of(str(found.branch[k])) if system.in_vacuum else -1
+            answer = Spectrum(system, found.gamma, float(found.r_f[k]), energy)
+            codes[k], index[k] = answer.status, answer.index
+            roots = answer.roots
+            kinds[k] = answer.kind
+            if codes[k] == status.OK:
+                unstable[k] = answer.unstable
+            if len(roots):
+                sigmas[k] = roots.sigma * speed
+                growth[k], frequency[k] = sigmas[k][0].real, sigmas[k][0].imag
+                error[k] = max(roots.error[0], found.error[k]) * speed
+    return Stability(
+        found,
+        growth,
+        frequency,
+        unstable,
+        index,
+        np.array(kinds, np.str_),
+        error,
+        codes,
+        tuple(sigmas),
+        _looked_at(found),
+    )
+
+
+def _looked_at(found: Equilibria) -> str:
+    if not has_drag(found.system):
+        return "all growth rates: none is larger than gamma, and their number is that of the energy"
+    reach = reach_of(found.system, found.gamma) * abs(found.gamma)
+    return f"eigenvalues of size up to {reach:.4g}; that nothing faster grows is not proved"
+
+
+def index_of(branch: str) -> int:
+    """Directions in which the energy of a shape in a vacuum falls: nodes and zeros of dp/da together.
+
+    Parameters
+    ----------
+    branch : str
+        As of `Equilibria`.
+
+    Returns
+    -------
+    int
+    """
+    if branch == "outward":
+        return 0
+    n, member = branch.split()
+    return 2 * int(n) - (member == "outer")

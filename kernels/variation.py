@@ -1,0 +1,432 @@
+"""The linearised motion about an equilibrium, from the fish up: coefficients on the equilibrium's own shot, and the
+Evans function.
+
+Units and axes of `kernels.drag`: lengths over g / Omega^2, times over 1 / Omega, u the arc length from the fish,
+position (X, Y, -h), F the force of the cable, pointing down it, T its size, V = (-Y, X, 0) the flow. With a
+perturbation eta exp(sigma t) of the position and phi exp(sigma t) of the force, S = k x, P = 1 - F F^T / T^2 and
+d(tau) = du / T,
+
+    eta' = -P phi,   phi' = -T (sigma + S)^2 eta - T A (sigma + S) eta + E P phi
+    at the fish:  phi = -[gamma^2 m_f (sigma + S)^2 + A_f (sigma + S)] eta,   A_f = C_f r (1 + e_y e_y^T)
+    at the tow point:  eta = 0
+
+where A is minus the derivative of the drag with respect to the velocity, E that with respect to the direction of the
+cable. With b = m / T^2, m = V . F, N = V - b F the flow across the cable and G = T |N|,
+
+    T A = kappa (G P + T^2 N N^T / G) - 2 kappa_t b F F^T
+    E P = kappa (G b P + m N N^T / G + (G / T^2) F N^T) + kappa_t b (2 F N^T + m P)
+
+(m <= 0, see `kernels.drag`.) D(sigma) = det eta at the tow point, of the three solutions with eta = 1 at the fish, is
+zero at the growth rates and nowhere else. It is an entire function, real on the real axis.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from towatlas.kernels import status
+from towatlas.kernels.compiling import helper, kernel
+from towatlas.kernels.drag import (
+    ACROSS,
+    ALWAYS,
+    FIRST,
+    FX,
+    FY,
+    FZ,
+    GROUPS,
+    KAPPA,
+    KAPPA_T,
+    KEPT,
+    KG,
+    NORMAL,
+    ON_NORMAL,
+    ON_SIDE,
+    ON_TANGENT,
+    ONE,
+    PACE,
+    PARAMETERS,
+    PRODUCT,
+    QUANTITIES,
+    RATIO,
+    ROUND,
+    SCALED,
+    STATE,
+    TANGENTIAL,
+    ZERO,
+    B,
+    G,
+    M,
+    T,
+    U,
+    X,
+    Y,
+    advance_jets,
+    clear,
+    expand_jets,
+    run,
+    step_lengths,
+    values,
+)
+from towatlas.kernels.drag_shots import IDLE, begin_lanes, landing, past_axis
+from towatlas.kernels.steppers import ORDER
+from towatlas.kernels.system import C_F, M_F, W_F
+from towatlas.kernels.vector import LANES, aligned, broadcast, load, store
+
+# Quantities after those of kernels.drag: what the matrices are made of, then these, by rows.
+UNIT, TT, KGB, KB, MKB = np.arange(QUANTITIES, QUANTITIES + 5)
+SLOPE, BF, N, NG, KN, KS, KBF = np.arange(QUANTITIES + 5, QUANTITIES + 26).reshape(7, 3)
+KNN, P, TA, EP = np.arange(QUANTITIES + 26, QUANTITIES + 62).reshape(4, 3, 3)
+ALL_QUANTITIES = np.int64(QUANTITIES + 62)
+FORCE = (FX, FY, FZ)
+
+
+def _matrices() -> list[tuple[Any, ...]]:
+    """The matrices as rows of a program like those of `kernels.drag`."""
+    axes = range(3)
+    rows = [(PRODUCT, T, T, TT, 1, ALWAYS)]
+    rows += [(RATIO, FORCE[i], TT, SLOPE[i], 1, ALWAYS) for i in axes]
+    rows += [(SCALED, ONE, UNIT, P[i, i], 1, ALWAYS) for i in axes]
+    rows += [(PRODUCT, FORCE[i], SLOPE[j], P[i, j], -1, ALWAYS) for i in axes for j in axes]
+    rows += [(PRODUCT, B, FORCE[i], BF[i], 1, ROUND) for i in axes]
+    rows += [(SCALED, ONE, Y, N[0], -1, ROUND), (SCALED, ONE, X, N[1], 1, ROUND)]
+    rows += [(SCALED, ONE, BF[i], N[i], -1, ROUND) for i in axes]
+    rows += [(PRODUCT, KG, B, KGB, 1, ON_NORMAL), (SCALED, KAPPA_T, B, KB, 1, ON_TANGENT)]
+    rows += [(PRODUCT, M, KB, MKB, 1, ON_TANGENT)]
+    for i in axes:
+        rows += [(RATIO, N[i], G, NG[i], 1, ON_NORMAL), (SCALED, KAPPA, NG[i], KN[i], 1, ON_NORMAL)]
+        rows += [(PRODUCT, KG, SLOPE[i], KS[i], 1, ON_NORMAL), (PRODUCT, KB, FORCE[i], KBF[i], 1, ON_TANGENT)]
+    for i in axes:
+        for j in axes:
+            rows += [
+                (PRODUCT, N[i], KN[j], KNN[i, j], 1, ON_NORMAL),
+                (PRODUCT, KG, P[i, j], TA[i, j], 1, ON_NORMAL),
+                (PRODUCT, TT, KNN[i, j], TA[i, j], 1, ON_NORMAL),
+                (PRODUCT, KBF[i], FORCE[j], TA[i, j], -2, ON_TANGENT),
+                (PRODUCT, KGB, P[i, j], EP[i, j], 1, ON_NORMAL),
+                (PRODUCT, M, KNN[i, j], EP[i, j], 1, ON_NORMAL),
+                (PRODUCT, KS[i], N[j], EP[i, j], 1, ON_NORMAL),
+                (PRODUCT, KBF[i], N[j], EP[i, j], 2, ON_TANGENT),
+                (PRODUCT, MKB, P[i, j], EP[i, j], 1, ON_TANGENT),
+            ]
+    return rows
+
+
+MATRICES = np.array(_matrices())
+# What is kept of a step: the tension, then the matrices P, T A and E P by rows.
+ROWS = 28
+KEPT_ROWS = np.array([T, *P.ravel(), *TA.ravel(), *EP.ravel()])
+# Orders of their series: the equations know no more.
+TERMS = np.int64(ORDER)
+TWO, THREE, SIX = np.int64(2), np.int64(3), np.int64(6)
+
+
+@helper
+def _expand_matrices(c, p, algebra, groups):
+    """Series of the matrices, after those of the shot."""
+    for k in range(np.int64(ORDER)):
+        clear(c, np.int64(QUANTITIES), ALL_QUANTITIES, np.int64(1), k)
+        store(c, UNIT * KEPT + k, broadcast(1.0 if k == 0 else 0.0))
+        run(c, p, MATRICES, k, algebra.products, algebra.pairs, np.int64(1), groups)
+
+
+@helper
+def _norm(c, first, lane):
+    """Root of the sum of squares of the leading coefficients of a matrix."""
+    total = 0.0
+    for at in range(first, first + 9):
+        total += c[at * KEPT * LANES + lane] ** 2
+    return np.sqrt(total)
+
+
+@helper
+def _shorten(c, p, h, lane, reach, bound):
+    """Step within h in which solutions for |sigma| <= reach change by a factor of about exp(bound)."""
+    tension = c[T * KEPT * LANES + lane]
+    fast = reach + 1.0
+    wave = np.sqrt(fast * (tension * fast + _norm(c, TA[0, 0], lane)))
+    rate = max(wave, _norm(c, EP[0, 0], lane))
+    return min(h, bound / (rate * p[PACE * LANES + lane]))
+
+
+@kernel
+def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, statuses, begin, stop):
+    """Series of the coefficients along the shapes begin..stop-1, for |sigma| <= reach; up to eight side by side.
+
+    series : shape (rows, most steps, ROWS, TERMS), in the part of a step; sizes : shape (rows, most steps), of the
+    steps in tau; starts : shape (rows, 3), the length of a bare tip that is left out, whether it is bare, and the
+    largest flow along the cable over the speed of its waves.
+    """
+    count = np.int64(1)
+    c, scratch = aligned(ALL_QUANTITIES * KEPT), aligned(QUANTITIES * KEPT)
+    p, new, h, target, ends, room = aligned(PARAMETERS), aligned(STATE), aligned(1), aligned(1), aligned(1), aligned(3)
+    paid, low = np.zeros(LANES), np.zeros(LANES)
+    work = (c, scratch, p, ends, paid, low)
+    groups = np.full(GROUPS, True)
+    for first in range(begin, stop, LANES):
+        jobs, fresh, ended = np.full(LANES, IDLE), np.zeros(LANES, np.bool_), np.zeros(LANES, np.bool_)
+        for lane in range(LANES):
+            fresh[lane] = first + lane < stop
+            jobs[lane] = first + lane if fresh[lane] else IDLE
+        begin_lanes(shots, algebra, jobs, fresh, work, count)
+        groups[ON_NORMAL] = groups[ON_TANGENT] = groups[ON_SIDE] = False
+        for lane in range(LANES):
+            i = jobs[lane]
+            if i != IDLE:
+                system = shots.systems[i]
+                steps[i], statuses[i] = 0, status.OK
+                starts[i, 0], starts[i, 2] = paid[lane], 0.0
+                starts[i, 1] = system[W_F] == 0.0 and system[M_F] == 0.0 and system[C_F] == 0.0
+                groups[ON_NORMAL] |= p[NORMAL * LANES + lane] != 0.0
+                groups[ON_TANGENT] |= p[TANGENTIAL * LANES + lane] != 0.0
+        groups[ACROSS] = groups[ON_NORMAL]
+        groups[ROUND] = groups[ON_NORMAL] or groups[ON_TANGENT]
+        busy = True
+        while busy:
+            expand_jets(c, p, algebra.products, algebra.pairs, count, groups)
+            _expand_matrices(c, p, algebra, groups)
+            step_lengths(c, p, count, room, h)
+            for lane in range(LANES):
+                if jobs[lane] != IDLE:
+                    h[lane] = _shorten(c, p, h[lane], lane, reach, bound)
+            store(room, TWO, values(c, U * KEPT, FIRST, load(h, ZERO)))
+            for lane in range(LANES):
+                ended[lane] = False
+                if jobs[lane] == IDLE:
+                    h[lane] = 0.0
+                    continue
+                remaining = (ends[lane] - paid[lane]) - low[lane]
+                if not h[lane] * room[2 * LANES + lane] < remaining:
+                    h[lane] = landing(c, p[PACE * LANES + lane], count, lane, remaining, h[lane])
+                    ended[lane] = True
+            again = True
+            while again:
+                advance_jets(c, p, new, h, target, algebra.products, count, algebra.degree)
+                again = False
+                if not groups[ACROSS]:
+                    break
+                past_axis(c, p, new, h, count, room)
+                for lane in range(LANES):
+                    if room[lane] > 1.0 and jobs[lane] != IDLE:
+                        h[lane] *= 0.5
+                        ended[lane] = False
+                        again = True
+            busy = False
+            for lane in range(LANES):
+                i = jobs[lane]
+                if i == IDLE:
+                    continue
+                if steps[i] == series.shape[1]:
+                    statuses[i], jobs[lane] = status.STEP_LIMIT, IDLE
+                    continue
+                # m is kept where there is drag only.
+                along = abs(c[M * KEPT * LANES + lane]) if groups[ROUND] else 0.0
+                starts[i, 2] = max(starts[i, 2], along * c[T * KEPT * LANES + lane] ** -1.5)
+                power = 1.0
+                for k in range(TERMS):
+                    for row in range(ROWS):
+                        series[i, steps[i], row, k] = c[(KEPT_ROWS[row] * KEPT + k) * LANES + lane] * power
+                    power *= h[lane]
+                sizes[i, steps[i]] = h[lane] * p[PACE * LANES + lane]
+                steps[i] += 1
+                add = new[U * LANES + lane] + low[lane]
+                total = paid[lane] + add
+                part = total - paid[lane]
+                low[lane] = (paid[lane] - (total - part)) + (add - part)
+                paid[lane] = total
+                p[PACE * LANES + lane] *= h[lane]
+                if not np.isfinite(total):
+                    statuses[i], jobs[lane] = status.BAD_INPUT, IDLE
+                elif ended[lane]:
+                    jobs[lane] = IDLE
+                busy = busy or jobs[lane] != IDLE
+            for q in range(X, STATE):
+                store(c, q * KEPT, load(new, q))
+
+
+@helper
+def _turn(eta, zeta, place, real, imaginary):
+    """(sigma + S) eta into zeta, at a place of both."""
+    for part in range(2):
+        # Real parts, then imaginary ones.
+        x, y, z = load(eta, place + part), load(eta, place + TWO + part), load(eta, place + 4 + part)
+        other = 1 - part
+        sign = -1.0 if part == 0 else 1.0
+        xo, yo, zo = load(eta, place + other), load(eta, place + TWO + other), load(eta, place + 4 + other)
+        store(zeta, place + part, real * x + sign * (imaginary * xo) - y)
+        store(zeta, place + TWO + part, real * y + sign * (imaginary * yo) + x)
+        store(zeta, place + 4 + part, real * z + sign * (imaginary * zo))
+
+
+@helper
+def _march_step(series, size, drag, eta, phi, zeta, alpha, real, imaginary, out):
+    """One step of the solutions in the lanes; eta, phi at order 0 to `out`, shape of 12 places. The largest of the
+    last terms over the solution."""
+    for k in range(TERMS):
+        at, ahead = k * SIX, (k + 1) * SIX
+        _turn(eta, zeta, at, real, imaginary)
+        _turn(zeta, alpha, at, real, imaginary)
+        for part in range(2):
+            e0 = e1 = e2 = f0 = f1 = f2 = broadcast(0.0)
+            for o in range(k + 1):
+                back = (k - o) * SIX + part
+                t = series[0, o]
+                f0 = f0 - t * load(alpha, back)
+                f1 = f1 - t * load(alpha, back + TWO)
+                f2 = f2 - t * load(alpha, back + 4)
+                for j in range(3):
+                    q = load(phi, back + 2 * j)
+                    e0 = e0 - series[1 + j, o] * q
+                    e1 = e1 - series[4 + j, o] * q
+                    e2 = e2 - series[7 + j, o] * q
+                    if drag:
+                        z = load(zeta, back + 2 * j)
+                        f0 = f0 + series[19 + j, o] * q - series[10 + j, o] * z
+                        f1 = f1 + series[22 + j, o] * q - series[13 + j, o] * z
+                        f2 = f2 + series[25 + j, o] * q - series[16 + j, o] * z
+            share = size / (k + 1)
+            store(eta, ahead + part, e0 * share)
+            store(eta, ahead + TWO + part, e1 * share)
+            store(eta, ahead + 4 + part, e2 * share)
+            store(phi, ahead + part, f0 * share)
+            store(phi, ahead + TWO + part, f1 * share)
+            store(phi, ahead + 4 + part, f2 * share)
+    for i in range(SIX):
+        u = v = broadcast(0.0)
+        for k in range(TERMS, -1, -1):
+            u = u + load(eta, k * SIX + i)
+            v = v + load(phi, k * SIX + i)
+        store(out, i, u)
+        store(out, SIX + i, v)
+
+
+@helper
+def _orthonormalise(out, first, weight, z):
+    """Make the three solutions from lane `first` on orthonormal, phi weighted; the logarithm of their volume, and its
+    share that is in eta."""
+    for column in range(3):
+        for i in range(3):
+            for half in range(2):
+                place = (half * 6 + 2 * i) * LANES + first + column
+                factor = 1.0 if half == 0 else weight
+                z[3 * half + i, column] = factor * (out[place] + 1j * out[place + LANES])
+    volume = 0.0
+    for column in range(3):
+        # Twice: once is not enough where columns are nearly the same.
+        for _ in range(2):
+            for other in range(column):
+                dot = 0.0 + 0.0j
+                for i in range(6):
+                    dot += np.conj(z[i, other]) * z[i, column]
+                for i in range(6):
+                    z[i, column] -= dot * z[i, other]
+        total = 0.0
+        for i in range(6):
+            total += z[i, column].real ** 2 + z[i, column].imag ** 2
+        size = np.sqrt(total)
+        for i in range(6):
+            z[i, column] /= size
+        volume += np.log(size)
+    return volume
+
+
+@helper
+def _determinant(z):
+    return (
+        z[0, 0] * (z[1, 1] * z[2, 2] - z[1, 2] * z[2, 1])
+        - z[0, 1] * (z[1, 0] * z[2, 2] - z[1, 2] * z[2, 0])
+        + z[0, 2] * (z[1, 0] * z[2, 1] - z[1, 1] * z[2, 0])
+    )
+
+
+@helper
+def _inverse(a, out):
+    """Inverse of a real matrix of three rows."""
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for m in range(3):
+            n, o = (m + 1) % 3, (m + 2) % 3
+            out[m, i] = a[j, n] * a[k, o] - a[j, o] * a[k, n]
+    det = a[0, 0] * out[0, 0] + a[0, 1] * out[1, 0] + a[0, 2] * out[2, 0]
+    for i in range(3):
+        for j in range(3):
+            out[i, j] /= det
+
+
+@helper
+def _turned(sigma, v):
+    """(sigma + S) v."""
+    return np.array([sigma * v[0] - v[1], sigma * v[1] + v[0], sigma * v[2]])
+
+
+@helper
+def _begin_solutions(series, start, fish, sigma, first, eta, phi, room):
+    """The three solutions with eta = 1 at the fish, in the lanes from `first` on.
+
+    fish : its mass over that of g / Omega^2 of cable, and C_f r.
+    """
+    rise, inverse = room[0], room[1]
+    bare = start[1] != 0.0
+    if bare:
+        # phi is all but proportional to the length below: T phi / u is what the equation makes of eta and phi.
+        for i in range(3):
+            for j in range(3):
+                rise[i, j] = -series[19 + 3 * i + j, 0]
+            rise[i, i] += series[0, 0] / start[0]
+        _inverse(rise, inverse)
+    for column in range(3):
+        e = np.zeros(3, np.complex128)
+        e[column] = 1.0
+        once = _turned(sigma, e)
+        twice = _turned(sigma, once)
+        f = np.zeros(3, np.complex128)
+        if bare:
+            for i in range(3):
+                for j in range(3):
+                    load_of = -series[0, 0] * twice[j]
+                    for n in range(3):
+                        load_of -= series[10 + 3 * j + n, 0] * once[n]
+                    f[i] += inverse[i, j] * load_of
+        else:
+            for i in range(3):
+                f[i] = -fish[0] * twice[i] - fish[1] * once[i] * (2.0 if i == 1 else 1.0)
+        for i in range(3):
+            at = 2 * i * LANES + first + column
+            eta[at], eta[at + LANES] = e[i].real, e[i].imag
+            phi[at], phi[at + LANES] = f[i].real, f[i].imag
+
+
+@kernel
+def evans(series, sizes, start, steps, fish, drag, sigma, values_of, logs):
+    """D at each of `sigma`, shape (points,), as values_of exp(logs), for one shape, two at a time."""
+    points = len(sigma)
+    eta, phi = aligned((TERMS + 1) * SIX), aligned((TERMS + 1) * SIX)
+    zeta, alpha, out = aligned((TERMS + 1) * SIX), aligned((TERMS + 1) * SIX), aligned(2 * SIX)
+    parts, z, room = aligned(2), np.zeros((6, 3), np.complex128), np.zeros((2, 3, 3))
+    for begin in range(0, points, 2):
+        count = min(2, points - begin)
+        for which in range(2):
+            at = begin + min(which, count - 1)
+            _begin_solutions(series[0], start, fish, sigma[at], 3 * which, eta, phi, room)
+            logs[at] = 0.0
+            for column in range(3):
+                parts[3 * which + column] = sigma[at].real
+                parts[LANES + 3 * which + column] = sigma[at].imag
+        real, imaginary = load(parts, ZERO), load(parts, FIRST)
+        for step in range(steps):
+            _march_step(series[step], sizes[step], drag, eta, phi, zeta, alpha, real, imaginary, out)
+            for which in range(count):
+                # That of a wave of this frequency.
+                weight = 1.0 / (np.sqrt(series[step, 0, 0]) * (1.0 + abs(sigma[begin + which])))
+                logs[begin + which] += _orthonormalise(out, 3 * which, weight, z)
+                if step == steps - 1:
+                    values_of[begin + which] = _determinant(z)
+                for column in range(3):
+                    for i in range(3):
+                        for half in range(2):
+                            place = 2 * i * LANES + 3 * which + column
+                            factor = 1.0 if half == 0 else 1.0 / weight
+                            value = factor * z[3 * half + i, column]
+                            if half == 0:
+                                eta[place], eta[place + LANES] = value.real, value.imag
+                            else:
+                                phi[place], phi[place + LANES] = value.real, value.imag
