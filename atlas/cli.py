@@ -10,13 +10,27 @@ import sys
 from contextlib import nullcontext
 
 from towatlas import __version__
-from towatlas.commands import build, critical, design, equilibria, fish, folds, info, plot, report, scene, shape, sweep
+from towatlas.commands import (
+    build,
+    critical,
+    design,
+    device,
+    equilibria,
+    fish,
+    folds,
+    info,
+    plot,
+    report,
+    scene,
+    shape,
+    sweep,
+)
 from towatlas.commands.common import FAILED, FILE, OK, USAGE, announce_compilation, say, shown_progress
 from towatlas.effort import patience
 from towatlas.tables.seal import AtlasFileError
 
 # In the order in which help lists them.
-COMMANDS = (critical, folds, equilibria, shape, fish, scene, sweep, design, build, plot, report, info)
+COMMANDS = (critical, folds, equilibria, shape, fish, scene, sweep, design, device, build, plot, report, info)
 
 
 def _parser() -> argparse.ArgumentParser:
