@@ -11,12 +11,15 @@ from towatlas.tables.atlas import open_atlas
 def add(commands: Any) -> None:
     """Declare the command."""
     parser = commands.add_parser(
-        "plot", help="draw a figure", description="Draw a figure: `critical` from an atlas, `drag` solved."
+        "plot",
+        help="draw a figure",
+        description="Draw a figure: `critical` from an atlas, `drag` and `device` solved.",
     )
     parser.add_argument(
         "figure",
-        choices=("critical", "drag"),
-        help="critical: speeds against cable length; drag: how drag closes the jumps, solved",
+        choices=("critical", "drag", "device"),
+        help="critical: speeds against cable length; drag: how drag closes the jumps; device: the tightest turns of "
+        "lateral force devices",
     )
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="FILE.svg, .png or .pdf")
     add_atlas(parser)
@@ -32,6 +35,13 @@ def _run(options: argparse.Namespace) -> int:
         from towatlas.plot.drag_folds import plot_drag_folds
 
         plot_drag_folds(ax=axes)
+        save_figure(figure, options.out)
+        return OK
+    if options.figure == "device":
+        figure, axes = new_figure(7.2, 4.8)
+        from towatlas.plot.device import plot_turns
+
+        plot_turns(axes)
         save_figure(figure, options.out)
         return OK
     atlas = open_atlas(options.atlas)
