@@ -56,6 +56,8 @@ figures: install  ## draw the figures of the README from build/atlas.nc, and the
 	$(BIN)/python -m towatlas report nrl7048 --out build/report.html
 	$(BIN)/python -m towatlas report cable-body --out build/cable-body.html
 	$(BIN)/python -m towatlas report dtmb713 --out build/dtmb713.html
+	$(BIN)/python -m towatlas report device --out build/device.html
+	$(BIN)/python -m towatlas plot device --out docs/device.svg
 
 clean:  ## remove .venv, build and caches
 	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache

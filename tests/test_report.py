@@ -82,7 +82,7 @@ def test_same_bytes_twice(page, tmp_path, capsys):
 def test_unknown_source(capsys):
     code, _, err = run(capsys, "report", "nrl7049")
     assert code == 2
-    assert "'nrl7048', 'cable-body', 'dtmb713'" in err
+    assert "'nrl7048', 'cable-body', 'dtmb713', 'device'" in err
 
 
 def test_page_of_an_unknown_kind(capsys, tmp_path):

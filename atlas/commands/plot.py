@@ -10,18 +10,20 @@ from towatlas.tables.atlas import open_atlas
 FIGURES = {
     "critical": "critical speeds against cable length, from an atlas",
     "drag": "how drag closes the jumps, solved",
+    "device": "the tightest turns of lateral force devices, solved",
 }
 ELSEWHERE = {
     "scene SCENE --out FILE": "its shapes from the side and from above, its jumps",
     "shape SCENE --out FILE": "one of these shapes, in m and N",
     "shape --lam ... --out FILE": "the shape of a cable without units",
+    "diagram --lam ... --out FILE": "every branch of shapes over the speed, what of it lasts",
     "sweep SCENE ... --out FILE": "depth, radius, tension, phase over length or speed",
     "report": "a source document with its figures, as a page",
 }
 
 
 def _listed(title: str, figures: dict[str, str]) -> str:
-    return "\n".join([title, *(f"  {name:<27} {words}" for name, words in figures.items())])
+    return "\n".join([title, *(f"  {name:<28} {words}" for name, words in figures.items())])
 
 
 def add(commands: Any) -> None:
@@ -48,6 +50,13 @@ def _run(options: argparse.Namespace) -> int:
         from towatlas.plot.drag_folds import plot_drag_folds
 
         plot_drag_folds(ax=axes)
+        save_figure(figure, options.out)
+        return OK
+    if options.figure == "device":
+        figure, axes = new_figure(7.2, 4.8)
+        from towatlas.plot.device import plot_turns
+
+        plot_turns(axes)
         save_figure(figure, options.out)
         return OK
     atlas = open_atlas(options.atlas)

@@ -164,3 +164,59 @@ def bracket(
     solved &= ~lost
     x[~solved] = np.nan
     return x, solved
+
+
+def root(function: Callable[[float], float], low: float, high: float) -> float:
+    """The root of one function between two ends at which it has different signs, to rounding.
+
+    Parameters
+    ----------
+    function : callable
+        Of one number.
+    low, high : float
+        Finite; the signs at them differ, or one value is zero.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ArithmeticError
+        Where the signs are the same, or the function becomes nan.
+
+    Notes
+    -----
+    Chandrupatla (1997): inverse quadratic interpolation where the three last values allow it, halving otherwise.
+
+    Examples
+    --------
+    >>> round(root(lambda x: x * x - 2.0, 1.0, 2.0), 12)
+    1.414213562373
+    """
+    a, b = high, low
+    at_a, at_b = function(a), function(b)
+    if not at_a * at_b <= 0.0:
+        raise ArithmeticError(f"the function has one sign, or none, at {low:g} and {high:g}: {at_b:g} and {at_a:g}")
+    c, at_c, share = a, at_a, 0.5
+    for _ in range(BRACKET_ROUNDS):
+        best, at_best = (a, at_a) if abs(at_a) < abs(at_b) else (b, at_b)
+        smallest = 2.0 * EPS * abs(best)
+        if at_best == 0.0 or abs(b - a) <= 2.0 * smallest:
+            return best
+        share = min(max(share, smallest / abs(b - a)), 1.0 - smallest / abs(b - a))
+        x = a + share * (b - a)
+        at_x = function(x)
+        if at_x != at_x:
+            raise ArithmeticError(f"the function is nan at {x:g}")
+        if (at_x > 0.0) == (at_a > 0.0):
+            c, at_c = a, at_a
+        else:
+            c, b, at_c, at_b = b, a, at_b, at_a
+        a, at_a = x, at_x
+        xi, phi = (a - b) / (c - b), (at_a - at_b) / (at_c - at_b) if at_c != at_b else 2.0
+        share = 0.5
+        if phi**2 < xi and (1.0 - phi) ** 2 < 1.0 - xi:
+            share = at_a / (at_b - at_a) * at_c / (at_b - at_c)
+            share += (c - a) / (b - a) * at_a / (at_c - at_a) * at_b / (at_c - at_b)
+    raise ArithmeticError(f"no root was found between {low:g} and {high:g} in {BRACKET_ROUNDS} rounds")

@@ -28,6 +28,7 @@ SOURCES = {
     "nrl7048": Source("NRL Report 7048 (Skop 1970)", "towatlas.report.nrl7048.page", "report.html"),
     "cable-body": Source("a cable and body in water", "towatlas.report.cable_body.page", "cable-body.html"),
     "dtmb713": Source("DTMB Report 713 (Pode 1950)", "towatlas.report.dtmb713.page", "dtmb713.html"),
+    "device": Source("a lateral force device (Ng, Rand, Keith 2001)", "towatlas.report.device.page", "device.html"),
 }
 
 
