@@ -73,17 +73,8 @@ __all__ = [
 _HOMES = {
     "effort": ("TooMuchWork", "patience"),
     "limits": ("excess_length", "massless_cable", "threshold_length"),
-    "results": (
-        "CriticalStates",
-        "Cusps",
-        "DragFolds",
-        "Equilibria",
-        "FishPositions",
-        "Flutter",
-        "Folds",
-        "Stability",
-        "Window",
-    ),
+    "results": ("CriticalStates", "Cusps", "DragFolds", "Equilibria", "FishPositions", "Folds"),
+    "results_motion": ("Branch", "Diagram", "Flutter", "Stability", "Window"),
     "scene.designs": ("design",),
     "scene.file": ("read_scene",),
     "scene.jumps": ("answer_scene",),
@@ -103,8 +94,6 @@ _HOMES = {
     "tables.seal": ("AtlasFileError",),
 }
 _HOME = {name: module for module, names in _HOMES.items() for name in names}
-
-
 # Public modules.
 _MODULES = ("device",)
 
