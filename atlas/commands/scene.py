@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from towatlas.commands import scene_margins as margins
+from towatlas.commands import scene_stability as verdicts
 from towatlas.commands.common import add_atlas, add_patience, print_json, real, say
 from towatlas.commands.common import speed as dimensionless_speed
 from towatlas.commands.scene_files import check_out, write_scene
@@ -68,6 +69,9 @@ def add(commands: Any) -> None:
     )
     parser.add_argument(
         "--sensitivities", action="store_true", help="also how jumps, depth and tensions move with each key"
+    )
+    parser.add_argument(
+        "--stability", action="store_true", help="also which shapes last, with growth times and frequencies"
     )
     add_atlas(parser)
     where = parser.add_mutually_exclusive_group()
@@ -144,11 +148,14 @@ def _run(options: argparse.Namespace) -> int:
     answer = answer_scene(scene, atlas, options.model, options.asked, options.compare)
     slopes = sensitivities_of(answer) if options.sensitivities else None
     found = margins_of(answer, slopes)
+    motion = verdicts.stability_of_scene(answer) if options.stability else None
     ending = margins.lines_of(found, answer)
+    if motion is not None:
+        ending = [*verdicts.lines_of(motion, answer), "", *ending]
     if options.out:
         write_scene(answer, options.out, ending, options.compare)
     elif options.json:
-        print_json(object_of(answer) | margins.as_object(found, asked, slopes))
+        print_json(object_of(answer) | margins.as_object(found, asked, slopes) | verdicts.as_object(motion, answer))
     else:
         table = [*margins.slope_lines(slopes), ""] if slopes else []
         print("\n".join([text_of(answer, options.compare), "", *table, *ending]))
