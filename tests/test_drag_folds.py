@@ -331,3 +331,15 @@ def test_shell(capsys, drag_file, tmp_path, monkeypatch):
     code, _, err = run(capsys, "plot", "drag", "--out", tmp_path / "drag.svg")
     assert code == 0
     assert (tmp_path / "drag.svg").stat().st_size > 5000
+
+
+def test_a_pair_that_appears_beyond_the_speeds_looked_at(capsys):
+    """There is nothing to follow from the vacuum on, and that is said."""
+    found = towatlas.solve_drag_folds(5.91588, 9749.99, 0.0146273, [1, 2, 3])
+    assert list(found.status) == [status.OK, status.BEYOND, status.BEYOND]
+    assert (towatlas.solve_critical(5.91588, 9749.99, [2, 3]).gamma > 50.0).all()
+    assert np.isnan(found.appears[1:]).all()
+    for cable in (("--lam=6.52262", "--wf=14342.7", "--C=3.7385e-07"), ("--lam=5.9", "--wf=9750", "--n=2", "--C=0.01")):
+        code, _, err = run(capsys, "critical", *cable, "--solve")
+        assert code == (0 if "--n=2" not in cable else 4)
+        assert "beyond the highest speed" in err

@@ -234,7 +234,7 @@ def table(**changes):
 def test_a_scene_names_its_keys_in_the_units_of_the_user():
     match = (
         r"cable.length = 5000 km with tow.radius = 1 m makes lam = 5e\+06, tow.speed = 30 kn makes gamma = 4.928\d+: "
-        r"[\d,]+ critical speeds below the speed, too many for 30 s of CPU: \d+ s or more; a shorter cable"
+        r"[\w ,]+, too many for 30 s of CPU: [\d,]+ s or more; a shorter cable"
     )
     began = time.process_time()
     with pytest.raises(TooMuchWork, match=match):

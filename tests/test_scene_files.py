@@ -418,7 +418,7 @@ def test_page(capsys, wet, tmp_path, compare):
     numbers = re.findall(r"-?\d+\.\d+", printed)
     assert len(numbers) > 15
     assert [number for number in numbers if number not in words] == []
-    for sentence in (*printed.split("\n\n")[0].splitlines(), printed.split("\n\n")[-1].strip()):
+    for sentence in (*printed.split("\n\n")[0].splitlines(), *printed.split("\n\n")[-1].strip().splitlines()):
         assert sentence in words
     assert ("Comparison of the models" in words) == ("Critical speeds, vacuum model" in words) == compare
     assert "<svg" in text

@@ -409,6 +409,8 @@ def _fold_rows(*, lam: Array, w_f: Array, n: Integers, which: Integers, c: Array
             curve, cusp_code = curves[cable], cusp_codes[cable]
             if cusp_code not in (status.OK, status.NO_CUSP):
                 codes[row] = cusp_code
+            elif len(curve) < 2:
+                codes[row] = status.BEYOND
             elif log_c[row] >= cusps[cable, 2] or (cusp_code == status.NO_CUSP and log_c[row] >= lasting[cable]):
                 codes[row] = status.NO_PAIR
             elif np.isfinite(log_c[row]) and (found := crossing(curve, log_c[row], side)) is not None:
@@ -450,7 +452,7 @@ def _lasting(curves: list[Curve], *, lam: Array, w_f: Array) -> tuple[Array, Arr
     best, error, at = np.full(rows, np.nan), np.full(rows, np.nan), np.full((rows, 2), np.nan)
     highest = np.log(GAMMA_MAX)
     for row, curve in enumerate(curves):
-        if len(curve) and curve.complete:
+        if len(curve) > 1 and curve.complete:
             points = _fine(curve, before=curve.event() < 0)
             k = int(np.argmin(points[:, 2])) if curve.event() >= 0 else len(points) - 1
             # The last point lies beyond the highest speed.

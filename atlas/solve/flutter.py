@@ -108,7 +108,7 @@ def flutter(
     --------
     >>> found = flutter(37.8, 1352, (3.1, 3.6), C=0.018)
     >>> [(w.branch, round(w.low, 6), w.low_kind, w.high_kind) for w in found.windows if not w.weak]
-    [('shape 2', 3.1, 'range', 'range'), ('shape 1', 3.303631, 'hopf', 'range')]
+    [('shape 1', 3.303631, 'hopf', 'range'), ('shape 2', 3.1, 'range', 'range')]
     """
     low, high = (check_speed(speed) for speed in gamma)
     if not 0.0 < low < high:
