@@ -25,6 +25,7 @@ from towatlas.kernels.sweeps import forward_shots_parallel, scan_systems_paralle
 from towatlas.limits import excess_length, long_cable, massless_cable
 from towatlas.solve.jets import jets_of
 from towatlas.solve.members import shoot_singly
+from towatlas.solve.motion import motions
 from towatlas.solve.shots import direction_of
 from towatlas.solve.shots import shoot as shoot_drag
 from towatlas.system import System
@@ -215,6 +216,49 @@ def test_slopes_written_out_are_those_of_the_program():
     place, force = np.hypot(table[:, :2], table[:, 2:3]).max(axis=1), table[:, 6]
     scale = np.stack([place, place, place, force, force, force, force], axis=1)
     assert (np.abs(fast - table) <= 1e-12 * np.maximum(np.abs(scale), np.abs(scale[..., :1]))).all()
+
+
+def evans_in_arc_length(case, sigma):
+    """D by an integrator of SciPy's, over the arc length, from the equations as they are written on paper."""
+    solve_ivp = pytest.importorskip("scipy.integrate").solve_ivp
+    gamma, r_f, system = case
+    g2, S = gamma**2, np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    r, kappa, kappa_t = r_f * g2, system.C / g2, system.C_t / g2
+    turn = sigma * np.eye(3) + S
+
+    def slopes(_, state):
+        x, F, eta, phi = state[:3].real, state[3:6].real, state[6:15].reshape(3, 3), state[15:].reshape(3, 3)
+        T = np.linalg.norm(F)
+        t, V = F / T, S @ x
+        along = V @ t
+        N = V - along * t
+        q = np.linalg.norm(N)
+        P, NN = np.eye(3) - np.outer(t, t), np.outer(N, N) / q
+        A = kappa * (q * P + NN) + 2.0 * kappa_t * abs(along) * np.outer(t, t)
+        E = kappa * (along * (q * np.eye(3) + NN) + q * np.outer(t, N))
+        E -= kappa_t * (2.0 * abs(along) * np.outer(t, N) + abs(along) * along * np.eye(3))
+        force = np.array([x[0], x[1], system.w]) - kappa * q * N - kappa_t * abs(along) * along * t
+        slope = P @ phi / T
+        moved = -(turn @ turn + A @ turn) @ eta + E @ slope
+        return np.concatenate([-t, force, -slope.ravel(), moved.ravel()])
+
+    pull = system.C_f * r * np.diag([1.0, 2.0, 1.0])
+    phi = -(g2 * system.m_f * turn @ turn + pull @ turn)
+    force = np.array([g2 * system.m_f * r, -system.C_f * r**2, g2 * system.w_f])
+    start = np.concatenate([[r, 0.0, 0.0], force, np.eye(3).ravel(), phi.ravel()]).astype(complex)
+    end = solve_ivp(slopes, (0.0, g2 * system.lam), start, method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    return np.linalg.det(end[6:15].reshape(3, 3))
+
+
+@pytest.mark.parametrize("case", DRAG[:3])
+def test_evans_function_against_an_independent_integrator(case):
+    gamma, r_f, system = case
+    motion = motions(np.array([r_f]), np.array([gamma]), system.row()[None], 1.0)[0]
+    sigma = np.array([0.3 + 0.5j, -0.2 + 0.9j, 0.4])
+    values, logs = motion.evans(sigma)
+    expected = [evans_in_arc_length(case, one) for one in sigma]
+    # Of the integrator.
+    np.testing.assert_allclose(values * np.exp(logs), expected, rtol=1e-9)
 
 
 def test_folds_are_folds():
