@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +12,10 @@ from towatlas.effort import patience
 from towatlas.kernels import status
 from towatlas.results_motion import Array, Branch, Diagram, Point
 from towatlas.solve.drag_equilibria import quantities
-from towatlas.solve.flutter import Follower, Sample, followed, looked_at
+from towatlas.solve.flutter import looked_at
+from towatlas.solve.follower import Follower, Mode, Sample, followed
 from towatlas.solve.paths import Fold
 from towatlas.system import System
-
-if TYPE_CHECKING:
-    from towatlas.solve.flutter import Mode
 
 SHOWN = ("x_f", "r_f", "z_f", "tension")
 
@@ -95,7 +93,7 @@ def diagram_of(system: System, low: float, high: float) -> Diagram:
 
 
 def _branch(
-    follower: Follower, samples: list[Sample], modes: "list[Mode]", began: Fold | None, ended: Fold | None
+    follower: Follower, samples: list[Sample], modes: list[Mode], began: Fold | None, ended: Fold | None
 ) -> Branch:
     speeds = np.array([follower.speed(sample.t) for sample in samples])
     columns = _columns(follower, np.array([sample.x for sample in samples]), speeds)

@@ -1,0 +1,323 @@
+"""The modes of motion of shapes, followed along every branch from speed to speed, and where they begin to grow."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from towatlas.effort import check_patience
+from towatlas.kernels import status
+from towatlas.numerics.rows import EPS
+from towatlas.results_motion import Window
+from towatlas.solve.growth import WEAK, Spectrum, has_drag, reach_of
+from towatlas.solve.motion import Complex, motions
+from towatlas.solve.paths import Fold, Path, Trace, trace
+from towatlas.solve.spectrum import CLOSE, polish, together
+from towatlas.system import System
+
+# Speeds looked at are no further apart than this part of them.
+SPACING = 0.01
+# Halvings of a step across an edge by counts, then rounds of secants on what is zero there.
+HALVINGS, ROUNDS = 12, 40
+# Of log gamma, at which an edge is found.
+SETTLED = 1e-13
+# Circle around two modes that meet without drag, and how far a mode may move from one sample to the next, in units of
+# Omega.
+CIRCLE, FAR = 0.05, 0.2
+REMEDY = "a narrower range of speeds, or a shorter cable, has fewer shapes to look at"
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A shape of one branch: the logarithm t of its speed over the lowest, that of the radius of its fish over
+    g / Omega^2, its nodes, its number from the axis outwards, and how it moves."""
+
+    t: float
+    x: float
+    nodes: int
+    place: int
+    spectrum: Spectrum
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Where a mode begins or ceases to grow, or to be followed."""
+
+    kind: str
+    t: float
+    frequency: float
+
+
+@dataclass
+class Mode:
+    """A mode that grows over a stretch of one branch: growth rates in units of Omega."""
+
+    start: Edge
+    end: Edge
+    samples: list[Sample]
+    sigma: list[complex]
+
+
+def followed(system: System, low: float, high: float) -> "tuple[Trace, Follower]":
+    """All shapes between two speeds, at speeds close enough for windows, and what follows their modes.
+
+    Parameters
+    ----------
+    system : System
+    low, high : float
+        Speeds [-], 0 < low < high.
+
+    Returns
+    -------
+    Trace
+    Follower
+    """
+    path, end = Path(system.row(), low, ("gamma",)), float(np.log(high / low))
+    count = int(np.ceil(end / np.log1p(SPACING))) + 1
+    traced = trace(path, 0.0, end, at=np.linspace(0.0, end, max(2, count)))
+    return traced, Follower(system, path)
+
+
+class Follower:
+    """Follows the modes of the shapes of one system from speed to speed."""
+
+    def __init__(self, system: System, path: Path):
+        self.system, self.path = system, path
+        self.drag = has_drag(system)
+
+    def speed(self, t: float) -> float:
+        return float(self.path.gamma * np.exp(t))
+
+    def branches(self, traced: Trace) -> Iterator[tuple[list[Sample], Fold | None, Fold | None]]:
+        """Samples of each branch, and the folds that begin and end it."""
+        labels, columns = traced.branches(), traced.columns
+        found: dict[int, list[tuple[int, int]]] = {}
+        for i, column in enumerate(labels):
+            for k, label in enumerate(column):
+                found.setdefault(int(label), []).append((i, k))
+        total, done = sum(len(places) for places in found.values()), 0
+        for places in found.values():
+            samples = []
+            for i, k in places:
+                check_patience("growth rates along the branches", REMEDY, done=done, of=total)
+                samples.append(self.sample(columns[i].t, float(columns[i].x[k]), k))
+                done += 1
+            first, last = places[0][0], places[-1][0]
+            before = traced.folds[first - 1] if first > 0 else None
+            after = traced.folds[last] if last < len(columns) - 1 else None
+            yield samples, before, after
+
+    def sample(self, t: float, x: float, place: int) -> Sample:
+        ends = self.path.shots(np.array([x]), np.array([t]), self.path.jets(1))
+        nodes = int(np.floor(ends.angle[0] / np.pi + 0.5))
+        return Sample(t, x, nodes, place, Spectrum(self.system, self.speed(t), float(np.exp(x) / self.speed(t) ** 2)))
+
+    def between(self, a: Sample, b: Sample, t: float) -> Sample:
+        """The shape of the branch of two samples at a speed between them."""
+        return self.sample(t, self.offset(a, b, t), a.place)
+
+    def offset(self, a: Sample, b: Sample, t: float) -> float:
+        """Log of the radius of the fish of that shape, by Newton's method."""
+        x = a.x + (t - a.t) / (b.t - a.t) * (b.x - a.x)
+        for _ in range(ROUNDS):
+            along, _, sound = self.path.log_rho(np.array([x]), np.array([t]), 1)
+            step = float(along[0, 0] / along[0, 1])
+            if not sound[0] or not np.isfinite(step):
+                break
+            x -= step
+            if abs(step) < 8.0 * EPS:
+                break
+        return x
+
+    def modes(self, samples: list[Sample], began: Fold | None, ended: Fold | None) -> list[Mode]:
+        """Modes that grow somewhere on a branch."""
+        first = samples[0]
+        kind, t = ("fold", began.t) if began is not None else ("range", first.t)
+        over: list[Mode] = []
+        open_ = [_begun(Edge(kind, t, float(s.imag)), first, complex(s)) for s in first.spectrum.growing]
+        for a, b in pairwise(samples):
+            known = a.spectrum.status == b.spectrum.status == status.OK
+            old, new = [mode.sigma[-1] for mode in open_], [complex(s) for s in b.spectrum.growing]
+            pairs = _matched(old, new, a.spectrum.unstable == b.spectrum.unstable)
+            going = {i for i, _ in pairs}
+            for i, mode in enumerate(open_):
+                if i not in going:
+                    mode.end = self.edge(b, a, old[i]) if known else Edge("unknown", a.t, old[i].imag)
+                    over.append(mode)
+            for i, k in pairs:
+                open_[i].samples.append(b)
+                open_[i].sigma.append(new[k])
+            open_ = [open_[i] for i, _ in pairs]
+            for k in set(range(len(new))) - {k for _, k in pairs}:
+                start = self.edge(a, b, new[k]) if known else Edge("unknown", b.t, new[k].imag)
+                open_.append(_begun(start, b, new[k]))
+        kind, t = ("fold", ended.t) if ended is not None else ("range", samples[-1].t)
+        for mode in open_:
+            mode.end = Edge(kind, t, mode.sigma[-1].imag)
+        return over + open_
+
+    def edge(self, still: Sample, growing: Sample, sigma: complex) -> Edge:
+        """Where a mode, that grows at one of two samples, begins to."""
+        try:
+            t, frequency = self.hopf(still, growing, sigma) if self.drag else self.krein(still, growing, sigma)
+        except _LostError:
+            return Edge("unknown", growing.t, sigma.imag)
+        return Edge("hopf" if self.drag else "krein", t, frequency)
+
+    def hopf(self, still: Sample, growing: Sample, sigma: complex) -> tuple[float, float]:
+        """Where the growth of a mode is zero, by secants that keep their bracket."""
+        damped = still.spectrum.roots.sigma[still.spectrum.roots.sigma.real <= 0.0]
+        ends = [(still.t, _nearest(damped, sigma)), (growing.t, sigma)]
+        heights = [ends[0][1].real, sigma.real]
+        t, here = growing.t, sigma
+        for _ in range(ROUNDS):
+            share = heights[0] / (heights[0] - heights[1])
+            t = ends[0][0] + share * (ends[1][0] - ends[0][0])
+            here = self.mode(still, growing, t, ends[0][1] + share * (ends[1][1] - ends[0][1]))
+            side = int(here.real > 0.0)
+            moved = abs(ends[side][0] - t)
+            # The end that stays counts half, so that it is not kept for ever.
+            heights[1 - side] *= 0.5
+            ends[side], heights[side] = (t, here), here.real
+            if moved < SETTLED or abs(here.real) < EPS:
+                break
+        return t, here.imag
+
+    def mode(self, a: Sample, b: Sample, t: float, guess: complex) -> complex:
+        """The growth rate next to a guess, of the shape between two samples."""
+        speed = self.speed(t)
+        r_f = np.array([np.exp(self.offset(a, b, t)) / speed**2])
+        reach = max(reach_of(self.system, speed), 1.1 * abs(guess))
+        motion = motions(r_f, np.array([speed]), self.system.row()[None], reach)[0]
+        roots, found = polish(motion, np.array([guess]), np.array([guess]))
+        if found[0] and abs(roots.sigma[0] - guess) < CLOSE:
+            return complex(roots.sigma[0])
+        return _nearest(self.between(a, b, t).spectrum.roots.sigma, guess)
+
+    def krein(self, still: Sample, growing: Sample, sigma: complex) -> tuple[float, float]:
+        """Where two oscillations meet without drag: a zero of the square of half their distance."""
+        ends = [still, growing]
+        centre = sigma
+        for _ in range(HALVINGS):
+            middle = self.between(still, growing, 0.5 * (ends[0].t + ends[1].t))
+            near = [complex(s) for s in middle.spectrum.growing if abs(s - centre) < FAR]
+            if near:
+                centre = min(near, key=lambda s: abs(s - centre))
+            ends[1 if near else 0] = middle
+        centre = 1j * centre.imag
+        heights = [self._height(sample, centre) for sample in ends]
+        sample = ends[1]
+        for _ in range(ROUNDS):
+            t = ends[1].t - heights[1] * (ends[1].t - ends[0].t) / (heights[1] - heights[0])
+            if not min(still.t, growing.t) <= t <= max(still.t, growing.t):
+                raise _LostError
+            sample = self.between(still, growing, t)
+            ends, heights = [ends[1], sample], [heights[1], self._height(sample, centre)]
+            if abs(ends[1].t - ends[0].t) < SETTLED or heights[1] == heights[0]:
+                break
+        return sample.t, centre.imag
+
+    def _height(self, sample: Sample, centre: complex) -> float:
+        speed = self.speed(sample.t)
+        r_f = np.array([np.exp(sample.x) / speed**2])
+        motion = motions(r_f, np.array([speed]), self.system.row()[None], 1.0 + abs(centre))[0]
+        near = together(motion, centre, CIRCLE).sigma
+        if len(near) < 2:
+            raise _LostError
+        one, other = near[np.argsort(np.abs(near - centre))[:2]]
+        return float((((one - other) / 2.0) ** 2).real)
+
+    def windows(self, modes: list[Mode]) -> Iterator[Window]:
+        """A window a mode; one without an edge of its own goes with that which it is inside of."""
+        groups: list[list[Mode]] = []
+        weak = {id(mode): max(s.real for s in mode.sigma) < WEAK for mode in modes}
+        # Long ones first, strong ones before weak ones.
+        for mode in sorted(modes, key=lambda mode: (weak[id(mode)], mode.start.t - mode.end.t)):
+            own = {mode.start.kind, mode.end.kind} & {"hopf", "krein"}
+            within = (g for g in groups if g[0].start.t <= mode.start.t and mode.end.t <= g[0].end.t)
+            group = None if own else next(within, None)
+            if group is None:
+                groups.append([mode])
+            else:
+                group.append(mode)
+        for group in sorted(groups, key=lambda group: group[0].start.t):
+            yield self.window(group, weak=weak[id(group[0])])
+
+    def window(self, modes: list[Mode], weak: bool) -> Window:
+        """The window of the first of some modes."""
+        first, last = modes[0].start, modes[0].end
+        best, sample, growth = modes[0], modes[0].samples[0], 0.0
+        for mode in modes:
+            for at, sigma in zip(mode.samples, mode.sigma, strict=True):
+                if sigma.real * self.speed(at.t) > growth:
+                    best, sample, growth = mode, at, sigma.real * self.speed(at.t)
+        sample, growth = self._summit(best, sample, growth)
+        low, high = self.speed(first.t), self.speed(last.t)
+        return Window(
+            branch=self.name(sample),
+            nodes=sample.nodes,
+            low=low,
+            high=high,
+            low_kind=first.kind,
+            high_kind=last.kind,
+            low_frequency=first.frequency * low,
+            high_frequency=last.frequency * high,
+            growth=growth,
+            gamma=self.speed(sample.t),
+            weak=weak,
+        )
+
+    def _summit(self, mode: Mode, sample: Sample, growth: float) -> tuple[Sample, float]:
+        """The largest growth between samples, where a parabola through three of them has its vertex."""
+        k = mode.samples.index(sample)
+        if not 0 < k < len(mode.samples) - 1:
+            return sample, growth
+        around = range(k - 1, k + 2)
+        t = [mode.samples[i].t for i in around]
+        rates = [mode.sigma[i].real * self.speed(mode.samples[i].t) for i in around]
+        slopes = [(rates[i + 1] - rates[i]) / (t[i + 1] - t[i]) for i in range(2)]
+        middles = [0.5 * (t[i + 1] + t[i]) for i in range(2)]
+        if not slopes[0] > slopes[1]:
+            return sample, growth
+        top = middles[0] + slopes[0] * (middles[1] - middles[0]) / (slopes[0] - slopes[1])
+        if not t[0] < top < t[2]:
+            return sample, growth
+        there = self.between(mode.samples[k - 1], mode.samples[k + 1], top)
+        if there.spectrum.unstable < 1:
+            return sample, growth
+        rate = _nearest(there.spectrum.growing, mode.sigma[k]).real * self.speed(there.t)
+        return (there, rate) if rate > growth else (sample, growth)
+
+    def name(self, sample: Sample) -> str:
+        """As of `Equilibria`."""
+        if not self.system.in_vacuum:
+            return f"shape {sample.place + 1}"
+        if sample.nodes == 0:
+            return "outward"
+        return f"{sample.nodes} {'outer' if sample.spectrum.index % 2 else 'inner'}"
+
+
+class _LostError(ArithmeticError):
+    """A mode cannot be followed."""
+
+
+def _begun(start: Edge, sample: Sample, sigma: complex) -> Mode:
+    return Mode(start, start, [sample], [sigma])
+
+
+def _nearest(sigma: Complex, guess: complex) -> complex:
+    if not len(sigma):
+        raise _LostError
+    return complex(sigma[np.argmin(np.abs(sigma - guess))])
+
+
+def _matched(old: list[complex], new: list[complex], all_of: bool) -> list[tuple[int, int]]:
+    """Pairs of modes of two samples, nearest first; none far apart, unless all go on."""
+    apart = np.abs(np.subtract.outer(np.array(old, complex), np.array(new, complex)))
+    pairs: list[tuple[int, int]] = []
+    for place in np.argsort(apart, axis=None):
+        i, k = divmod(int(place), len(new))
+        if all(i != pair[0] and k != pair[1] for pair in pairs) and (all_of or apart[i, k] < FAR):
+            pairs.append((i, k))
+    return sorted(pairs)
