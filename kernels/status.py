@@ -18,8 +18,7 @@ NO_CUSP = 11
 NOT_AGAIN = 12
 FLOW_OUTRUNS_WAVES = 13
 NOT_COUNTED = 14
-NO_THEORY = 15
-BEYOND = 16
+BEYOND = 15
 
 SENTENCES = {
     OK: "computed",
@@ -39,12 +38,11 @@ SENTENCES = {
     FLOW_OUTRUNS_WAVES: "the flow along the cable is faster than its waves, as next to a bare end: motions of any "
     "frequency may grow there, so that a count of those that do means nothing",
     NOT_COUNTED: "growth rates were found, but not that there are no others",
-    NO_THEORY: "growth rates with a side force are not known to this program",
     BEYOND: "even without drag the pair appears beyond the highest speed looked at",
 }
 
 # Names for CF flag_meanings: one word each, in the order of the codes.
 FLAG_MEANINGS = (
     "computed no_transition step_limit not_converged outside_atlas not_found_by_scan bad_input lost_in_rounding "
-    "near_fold no_pair never_ends no_cusp not_again flow_outruns_waves not_counted no_theory beyond"
+    "near_fold no_pair never_ends no_cusp not_again flow_outruns_waves not_counted beyond"
 )

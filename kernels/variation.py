@@ -13,11 +13,13 @@ d(tau) = du / T,
 where A is minus the derivative of the drag with respect to the velocity, E that with respect to the direction of the
 cable. With b = m / T^2, m = V . F, N = V - b F the flow across the cable and G = T |N|,
 
-    T A = kappa (G P + T^2 N N^T / G) - 2 kappa_t b F F^T
+    T A = kappa (G P + T^2 N N^T / G) - 2 kappa_t b F F^T - kappa_s (W (c V - 2 beta d N)^T + rho A F x)
     E P = kappa (G b P + m N N^T / G + (G / T^2) F N^T) + kappa_t b (2 F N^T + m P)
+          + kappa_s (2 beta d b W N^T - rho A V x P)
 
-(m <= 0, see `kernels.drag`.) D(sigma) = det eta at the tow point, of the three solutions with eta = 1 at the fish, is
-zero at the growth rates and nowhere else. It is an entire function, real on the real axis.
+with W = F x V, A of the side force as in `kernels.drag`, d = A^2 / rho and c = 3 A / rho - 2 d (m <= 0, see there).
+D(sigma) = det eta at the tow point, of the three solutions with eta = 1 at the fish, is zero at the growth rates and
+nowhere else. It is an entire function, real on the real axis.
 """
 
 from typing import Any
@@ -29,12 +31,15 @@ from towatlas.kernels.compiling import helper, kernel
 from towatlas.kernels.drag import (
     ACROSS,
     ALWAYS,
+    BETA,
     FIRST,
     FX,
     FY,
     FZ,
     GROUPS,
+    KA,
     KAPPA,
+    KAPPA_S,
     KAPPA_T,
     KEPT,
     KG,
@@ -48,12 +53,16 @@ from towatlas.kernels.drag import (
     PRODUCT,
     QUANTITIES,
     RATIO,
+    RHO,
     ROUND,
     SCALED,
+    SIDE,
     STATE,
     TANGENTIAL,
     ZERO,
+    A,
     B,
+    D,
     G,
     M,
     T,
@@ -73,10 +82,10 @@ from towatlas.kernels.system import C_F, M_F, W_F
 from towatlas.kernels.vector import LANES, aligned, broadcast, load, store
 
 # Quantities after those of kernels.drag: what the matrices are made of, then these, by rows.
-UNIT, TT, KGB, KB, MKB = np.arange(QUANTITIES, QUANTITIES + 5)
-SLOPE, BF, N, NG, KN, KS, KBF = np.arange(QUANTITIES + 5, QUANTITIES + 26).reshape(7, 3)
-KNN, P, TA, EP = np.arange(QUANTITIES + 26, QUANTITIES + 62).reshape(4, 3, 3)
-ALL_QUANTITIES = np.int64(QUANTITIES + 62)
+UNIT, TT, KGB, KB, MKB, AR, A2R, KC, BA, KBA, KAX, KAY = np.arange(QUANTITIES, QUANTITIES + 12)
+SLOPE, BF, N, NG, KN, KS, KBF, WV, KWV, KBW, BKBW, KAF = np.arange(QUANTITIES + 12, QUANTITIES + 48).reshape(12, 3)
+KNN, P, TA, EP = np.arange(QUANTITIES + 48, QUANTITIES + 84).reshape(4, 3, 3)
+ALL_QUANTITIES = np.int64(QUANTITIES + 84)
 FORCE = (FX, FY, FZ)
 
 
@@ -108,6 +117,34 @@ def _matrices() -> list[tuple[Any, ...]]:
                 (PRODUCT, KBF[i], N[j], EP[i, j], 2, ON_TANGENT),
                 (PRODUCT, MKB, P[i, j], EP[i, j], 1, ON_TANGENT),
             ]
+    return rows + _side_force()
+
+
+def _side_force() -> list[tuple[Any, ...]]:
+    """What the side force adds to the matrices."""
+    axes = range(3)
+    rows = [(RATIO, A, RHO, AR, 1, ON_SIDE), (PRODUCT, A, AR, A2R, 1, ON_SIDE)]
+    rows += [(SCALED, KAPPA_S, AR, KC, 3, ON_SIDE), (SCALED, KAPPA_S, A2R, KC, -2, ON_SIDE)]
+    rows += [(SCALED, BETA, A2R, BA, 1, ON_SIDE), (SCALED, KAPPA_S, BA, KBA, 1, ON_SIDE)]
+    rows += [(PRODUCT, KA, X, KAX, 1, ON_SIDE), (PRODUCT, KA, Y, KAY, 1, ON_SIDE)]
+    rows += [
+        (PRODUCT, FZ, X, WV[0], -1, ON_SIDE),
+        (PRODUCT, FZ, Y, WV[1], -1, ON_SIDE),
+        (SCALED, ONE, D, WV[2], 1, ON_SIDE),
+    ]
+    rows += [(PRODUCT, KA, FORCE[i], KAF[i], 1, ON_SIDE) for i in axes]
+    for i in axes:
+        rows += [(PRODUCT, KC, WV[i], KWV[i], 1, ON_SIDE), (PRODUCT, KBA, WV[i], KBW[i], 1, ON_SIDE)]
+        rows += [(PRODUCT, KBW[i], B, BKBW[i], 1, ON_SIDE)]
+        rows += [(PRODUCT, KWV[i], Y, TA[i, 0], 1, ON_SIDE), (PRODUCT, KWV[i], X, TA[i, 1], -1, ON_SIDE)]
+        rows += [(PRODUCT, KBW[i], N[j], TA[i, j], 2, ON_SIDE) for j in axes]
+        rows += [(PRODUCT, BKBW[i], N[j], EP[i, j], 2, ON_SIDE) for j in axes]
+        # F x, by its columns.
+        j, k = (i + 1) % 3, (i + 2) % 3
+        rows += [(SCALED, ONE, KAF[k], TA[i, j], 1, ON_SIDE), (SCALED, ONE, KAF[j], TA[i, k], -1, ON_SIDE)]
+    for j in axes:
+        rows += [(PRODUCT, KAX, P[2, j], EP[0, j], -1, ON_SIDE), (PRODUCT, KAY, P[2, j], EP[1, j], -1, ON_SIDE)]
+        rows += [(PRODUCT, KAX, P[0, j], EP[2, j], 1, ON_SIDE), (PRODUCT, KAY, P[1, j], EP[2, j], 1, ON_SIDE)]
     return rows
 
 
@@ -178,8 +215,9 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
                 starts[i, 1] = system[W_F] == 0.0 and system[M_F] == 0.0 and system[C_F] == 0.0
                 groups[ON_NORMAL] |= p[NORMAL * LANES + lane] != 0.0
                 groups[ON_TANGENT] |= p[TANGENTIAL * LANES + lane] != 0.0
-        groups[ACROSS] = groups[ON_NORMAL]
-        groups[ROUND] = groups[ON_NORMAL] or groups[ON_TANGENT]
+                groups[ON_SIDE] |= p[SIDE * LANES + lane] != 0.0
+        groups[ACROSS] = groups[ON_NORMAL] or groups[ON_SIDE]
+        groups[ROUND] = groups[ACROSS] or groups[ON_TANGENT]
         busy = True
         while busy:
             expand_jets(c, p, algebra.products, algebra.pairs, count, groups)
@@ -206,7 +244,8 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
                     break
                 past_axis(c, p, new, h, count, room)
                 for lane in range(LANES):
-                    if room[lane] > 1.0 and jobs[lane] != IDLE:
+                    past = room[lane] > 1.0 or (groups[ON_SIDE] and room[LANES + lane] > 1.0)
+                    if past and jobs[lane] != IDLE:
                         h[lane] *= 0.5
                         ended[lane] = False
                         again = True

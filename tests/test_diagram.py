@@ -67,9 +67,6 @@ def test_files(found, tmp_path, capsys):
         assert data.sizes["branch"] == 3
         assert {"point_kind", "lasts", "growth"} <= set(data)
     assert run(capsys, "diagram", *cable, "--out", tmp_path / "d.txt")[0] == 2
-    code, _, err = run(capsys, "diagram", *cable, "--C=1", "--C-s=0.1", "--b-s=0.2")
-    assert code == 2
-    assert "side force" in err
 
 
 @pytest.mark.parametrize("show", SHOWN)

@@ -95,6 +95,3 @@ class TestCommand:
         code, _, err = run(capsys, "flutter", "--lam=3", "--wf=1", "--gamma=-2:-1")
         assert code == 2
         assert "two positive speeds" in err
-        code, _, err = run(capsys, "flutter", "--lam=3", "--wf=1", "--gamma=1:2", "--C=1", "--C-s=0.1", "--b-s=0.2")
-        assert code == 2
-        assert "side force" in err

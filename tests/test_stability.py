@@ -334,10 +334,18 @@ class TestWhereMethodsFail:
         assert (found.kind == "unknown").all()
         assert "bare end" in found.sentence(0)
 
-    def test_a_side_force_is_refused(self):
-        found = towatlas.stability(3.0, 0.2, 0.3, C=1.0, C_s=0.1, b_s=0.2)
-        assert (found.status == status.NO_THEORY).all()
-        assert np.isnan(found.growth).all()
+
+def test_a_side_force_turns_with_the_turn():
+    """To port it is what its opposite is to starboard; with none it is the limit of little."""
+    fluid = {"C": 1.0, "C_t": 0.02, "b_s": 0.2}
+    starboard = towatlas.stability(3.0, 0.2, 0.3, C_s=0.1, **fluid)
+    port = towatlas.stability(3.0, 0.2, -0.3, C_s=-0.1, **fluid)
+    other = towatlas.stability(3.0, 0.2, 0.3, C_s=-0.1, **fluid)
+    np.testing.assert_allclose(port.growth, starboard.growth, rtol=1e-10)
+    assert abs(other.growth[0] / starboard.growth[0] - 1.0) > 1e-3
+    none = towatlas.stability(3.0, 0.2, 0.3, **fluid)
+    little = towatlas.stability(3.0, 0.2, 0.3, C_s=1e-8, **fluid)
+    np.testing.assert_allclose(little.growth, none.growth, rtol=1e-6)
 
 
 class TestScene:
@@ -372,7 +380,4 @@ class TestCommand:
         assert "flutter" in out.splitlines()[2]
 
     def test_what_is_refused(self, capsys):
-        code, _, err = run(capsys, "stability", "--lam=3", "--wf=0.2", "--gamma=0.3", "--C=1", "--C-s=0.1", "--b-s=0.2")
-        assert code == 1
-        assert "side force" in err
         assert run(capsys, "stability", "--lam=-3", "--wf=0.2", "--gamma=0.3")[0] == 2

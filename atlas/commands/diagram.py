@@ -56,10 +56,7 @@ def _run(options: argparse.Namespace) -> int:
 
     if options.out and options.out.suffix.lower() not in FORMATS:
         raise ValueError(f"--out {options.out}: the ending must be one of {', '.join(FORMATS)}")
-    medium = fluid(options)
-    if {"C_s", "b_s"} & set(medium):
-        raise ValueError("growth rates with a side force are not known to this program: leave --C-s and --b-s out")
-    found = diagram(options.lam, options.wf, options.gamma, **medium)
+    found = diagram(options.lam, options.wf, options.gamma, **fluid(options))
     kind = options.out.suffix.lower() if options.out else ".csv"
     if kind == ".csv":
         _write_csv(found, options.out)

@@ -35,11 +35,7 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     from towatlas.solve.flutter import flutter
 
-    medium = fluid(options)
-    for name in ("C_s", "b_s"):
-        if medium.pop(name, None) is not None:
-            raise ValueError("growth rates with a side force are not known to this program: leave --C-s and --b-s out")
-    found = flutter(options.lam, options.wf, options.gamma, **medium)
+    found = flutter(options.lam, options.wf, options.gamma, **fluid(options))
     rows = [_row(window) for window in found.windows]
     print_json(rows) if options.json else _print_table(rows)
     say(f"looked at: {found.looked_at}")

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,8 @@ def diagram(
     C_f: float = 0.0,
     w: float = 1.0,
     C_t: float = 0.0,
+    C_s: float = 0.0,
+    b_s: float = inf,
 ) -> Diagram:
     """All branches of shapes of a towed cable between two speeds, with what lasts.
 
@@ -40,8 +43,9 @@ def diagram(
     w_f : float
         Fish weight over (mu + rho A) g R [-].
     gamma : (float, float)
-        From which speed Omega sqrt(R/g) to which [-], > 0.
-    C, m_f, C_f, w, C_t : float
+        From which speed Omega sqrt(R/g) to which [-], > 0, a turn to starboard; one to port is its mirror image, with
+        -C_s.
+    C, m_f, C_f, w, C_t, C_s, b_s : float
         The fluid, as in `equilibria`; a vacuum by default.
 
     Returns
@@ -64,7 +68,7 @@ def diagram(
     if not 0.0 < low < high:
         raise ValueError(f"gamma must be two positive speeds, the lower first, got {gamma!r}")
     with patience():
-        return diagram_of(System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t), low, high)
+        return diagram_of(System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t, C_s=C_s, b_s=b_s), low, high)
 
 
 def diagram_of(system: System, low: float, high: float) -> Diagram:
@@ -73,7 +77,6 @@ def diagram_of(system: System, low: float, high: float) -> Diagram:
     Parameters
     ----------
     system : System
-        Without side force.
     low, high : float
         Speeds [-], 0 < low < high.
 

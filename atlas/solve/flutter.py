@@ -1,6 +1,7 @@
 """Windows of speed in which shapes do not last, along every branch of one cable, with their edges solved for."""
 
 from collections.abc import Sequence
+from math import inf
 
 from towatlas.checks import check_speed
 from towatlas.effort import patience
@@ -20,6 +21,8 @@ def flutter(
     C_f: float = 0.0,
     w: float = 1.0,
     C_t: float = 0.0,
+    C_s: float = 0.0,
+    b_s: float = inf,
 ) -> Flutter:
     """Windows of speed in which a shape of a towed cable does not last, along each of its branches.
 
@@ -30,8 +33,9 @@ def flutter(
     w_f : float
         Fish weight over (mu + rho A) g R [-].
     gamma : (float, float)
-        From which speed Omega sqrt(R/g) to which [-], > 0.
-    C, m_f, C_f, w, C_t : float
+        From which speed Omega sqrt(R/g) to which [-], > 0, a turn to starboard; one to port is its mirror image, with
+        -C_s.
+    C, m_f, C_f, w, C_t, C_s, b_s : float
         The fluid, as in `equilibria`; a vacuum by default.
 
     Returns
@@ -63,7 +67,7 @@ def flutter(
     low, high = (check_speed(speed) for speed in gamma)
     if not 0.0 < low < high:
         raise ValueError(f"gamma must be two positive speeds, the lower first, got {gamma!r}")
-    system = System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t)
+    system = System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t, C_s=C_s, b_s=b_s)
     with patience():
         return flutter_of(system, low, high)
 
@@ -74,7 +78,6 @@ def flutter_of(system: System, low: float, high: float) -> Flutter:
     Parameters
     ----------
     system : System
-        Without side force.
     low, high : float
         Speeds [-], 0 < low < high.
 

@@ -45,7 +45,7 @@ def reach_of(system: System, gamma: float) -> float:
 
 
 def has_drag(system: System) -> bool:
-    """Whether motion is damped.
+    """Whether the fluid does work on motions.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def has_drag(system: System) -> bool:
     -------
     bool
     """
-    return bool(system.C or system.C_f or system.C_t)
+    return bool(system.C or system.C_f or system.C_t or system.C_s)
 
 
 class Spectrum:
@@ -64,7 +64,6 @@ class Spectrum:
     Parameters
     ----------
     system : System
-        Without side force.
     gamma : float
         Speed [-].
     r_f : float

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from towatlas.effort import check_patience
 from towatlas.kernels import status
-from towatlas.kernels.system import C_F, C_T, M_F, C
+from towatlas.kernels.system import C_F, C_S, C_T, M_F, C
 from towatlas.solve.jets import jets_of
 from towatlas.solve.shots import upright
 
@@ -42,7 +42,7 @@ class Motion:
     fish : ndarray, shape (2,)
         Mass of the fish, and C_f r.
     drag : bool
-        Whether there is drag.
+        Whether there is drag along the cable, or a side force.
     reach : float
         |sigma| up to which the steps are short enough.
     status : int
@@ -101,7 +101,7 @@ def motions(r_f: Array, gamma: Array, systems: Array, reach: float, bound: float
     gamma : ndarray, shape (shapes,)
         Speed [-].
     systems : ndarray, shape (shapes, columns)
-        As of `System.row`, without side force.
+        As of `System.row`.
     reach : float
         |sigma| for which they are wanted, in units of Omega, > 0.
     bound : float
@@ -136,7 +136,7 @@ def motions(r_f: Array, gamma: Array, systems: Array, reach: float, bound: float
         for i in range(rows):
             system, count = shots.systems[i], steps[i]
             fish = np.array([shots.gamma2[i] * system[M_F], system[C_F] * shots.r[i]])
-            drag = bool(system[C] or system[C_T])
+            drag = bool(system[C] or system[C_T] or system[C_S])
             part = series[i, :count].copy(), sizes[i, :count].copy(), starts[i].copy()
             found.append(Motion(*part, fish, drag, reach, int(codes[i])))
     return found

@@ -38,7 +38,7 @@ def stability(
     gamma : float
         Rotational frequency Omega sqrt(R/g) [-].
     C, m_f, C_f, w, C_t, C_s, b_s : float
-        The fluid, as in `equilibria`; a vacuum by default. With a side force there is a status in place of an answer.
+        The fluid, as in `equilibria`; a vacuum by default.
 
     Returns
     -------
@@ -102,11 +102,9 @@ def stability_of(found: Equilibria) -> Stability:
     unstable, index = np.full(count, -1), np.full(count, -1)
     codes = np.full(count, status.OK, np.int8)
     kinds, sigmas = ["unknown"] * count, [np.empty(0, np.complex128)] * count
-    if system.C_s != 0.0:
-        codes[:] = status.NO_THEORY
     with patience():
-        for k in np.flatnonzero(codes == status.OK):
-            check_patience("growth rates of the shapes", REMEDY, done=int(k), of=count)
+        for k in range(count):
+            check_patience("growth rates of the shapes", REMEDY, done=k, of=count)
             energy = index_of(str(found.branch[k])) if system.in_vacuum else -1
             answer = Spectrum(system, found.gamma, float(found.r_f[k]), energy)
             codes[k], index[k] = answer.status, answer.index
