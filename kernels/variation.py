@@ -154,7 +154,7 @@ ROWS = 28
 KEPT_ROWS = np.array([T, *P.ravel(), *TA.ravel(), *EP.ravel()])
 # Orders of their series: the equations know no more.
 TERMS = np.int64(ORDER)
-TWO, THREE, SIX = np.int64(2), np.int64(3), np.int64(6)
+TWO, SIX = np.int64(2), np.int64(6)
 
 
 @helper
