@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from towatlas.solve.flutter import flutter
     from towatlas.solve.folds import folds
     from towatlas.solve.many import equilibria_many
+    from towatlas.solve.proof.certificates import Certificate, certify
     from towatlas.solve.shapes import shape, shape_of
     from towatlas.solve.stability import stability, stability_of
     from towatlas.system import System
@@ -34,6 +35,7 @@ __all__ = [
     "Atlas",
     "AtlasFileError",
     "Branch",
+    "Certificate",
     "CriticalStates",
     "Cusps",
     "Diagram",
@@ -47,6 +49,7 @@ __all__ = [
     "TooMuchWork",
     "Window",
     "answer_scene",
+    "certify",
     "cusps",
     "design",
     "diagram",
@@ -87,6 +90,7 @@ _HOMES = {
     "solve.flutter": ("flutter",),
     "solve.folds": ("folds",),
     "solve.many": ("equilibria_many",),
+    "solve.proof.certificates": ("Certificate", "certify"),
     "solve.shapes": ("shape", "shape_of"),
     "solve.stability": ("stability", "stability_of"),
     "system": ("System",),
