@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from towatlas.solve.folds import folds
     from towatlas.solve.many import equilibria_many
     from towatlas.solve.proof.certificates import Certificate, certify
+    from towatlas.solve.proof.states import CertifiedEquilibria, certify_equilibria
     from towatlas.solve.shapes import shape, shape_of
     from towatlas.solve.stability import stability, stability_of
     from towatlas.system import System
@@ -36,6 +37,7 @@ __all__ = [
     "AtlasFileError",
     "Branch",
     "Certificate",
+    "CertifiedEquilibria",
     "CriticalStates",
     "Cusps",
     "Diagram",
@@ -50,6 +52,7 @@ __all__ = [
     "Window",
     "answer_scene",
     "certify",
+    "certify_equilibria",
     "cusps",
     "design",
     "diagram",
@@ -91,6 +94,7 @@ _HOMES = {
     "solve.folds": ("folds",),
     "solve.many": ("equilibria_many",),
     "solve.proof.certificates": ("Certificate", "certify"),
+    "solve.proof.states": ("CertifiedEquilibria", "certify_equilibria"),
     "solve.shapes": ("shape", "shape_of"),
     "solve.stability": ("stability", "stability_of"),
     "system": ("System",),

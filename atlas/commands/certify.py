@@ -14,6 +14,7 @@ from towatlas.commands.common import (
     order,
     print_json,
     say,
+    speed,
 )
 
 EIGHTHS = tuple(f"{k}/8" for k in range(1, 9))
@@ -30,6 +31,9 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("atlas", nargs="?", type=Path, metavar="ATLAS", help="prove its nodes, instead of one cable")
     add_cable(parser, gamma=False, required=False)
+    parser.add_argument(
+        "--gamma", type=speed, metavar="GAMMA", help="prove all equilibria at one speed, instead of a fold"
+    )
     parser.add_argument("--n", type=order, default=1, metavar="N", help="number of the transition, default %(default)s")
     parser.add_argument("--digits", type=int, default=30, metavar="D", help="wanted, default %(default)s")
     parser.add_argument("--json", action="store_true", help="JSON instead of lines")
@@ -46,7 +50,9 @@ def _run(options: argparse.Namespace) -> int:
     if (options.atlas is None) == (options.lam is None or options.wf is None):
         raise ValueError("name either an ATLAS, or a cable with --lam and --wf")
     try:
-        return _table(options) if options.atlas is not None else _one(options)
+        if options.atlas is not None:
+            return _table(options)
+        return _one(options) if options.gamma is None else _states(options)
     except ImportError as error:
         say(str(error))
         return FAILED
@@ -65,6 +71,20 @@ def _one(options: argparse.Namespace) -> int:
         print(f"unique {found.unique}")
     say(f"{found.status}: {found.reason}")
     return {CERTIFIED: OK, NO_TRANSITION: NO_STATE}.get(found.status, FAILED)
+
+
+def _states(options: argparse.Namespace) -> int:
+    from towatlas.solve.proof.certificates import CERTIFIED
+    from towatlas.solve.proof.states import certify_equilibria
+
+    found = certify_equilibria(options.lam, options.wf, options.gamma)
+    if options.json:
+        print_json(dataclasses.asdict(found))
+    else:
+        for state in found.states:
+            print(f"{state.branch:<9} R_x0 {state.R_x0} +- {state.R_x0_radius}  x_f {state.x_f} +- {state.x_f_radius}")
+    say(f"{found.status}: {found.reason}")
+    return OK if found.status == CERTIFIED else FAILED
 
 
 def _table(options: argparse.Namespace) -> int:

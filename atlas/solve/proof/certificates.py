@@ -214,7 +214,7 @@ def answer(chain: Chain, claim: Claim, steps: list[StepBounds], digits: int) -> 
             raise Refused(NOT_ISOLATED, f"this fold has index {index}, not {chain.n}")
         u = end_hull(chain, claim)[1]
         parts = [G.sqrt(), -chain.sign * u / G, chain.sign * a / G]
-        texts = [text for part in parts for text in _decimal(part, digits)]
+        texts = [text for part in parts for text in decimal(part, digits)]
     names = ("gamma", "gamma_radius", "R_x0", "R_x0_radius", "x_f", "x_f_radius")
     numbers: dict[str, Any] = dict(zip(names, texts, strict=True))
     reason = f"a fold in a box about it, the zero number {index} of q on its shot; nothing is proved between such boxes"
@@ -227,8 +227,19 @@ def _reached(found: Certificate, digits: int) -> bool:
     return Decimal(found.gamma_radius or "inf") <= Decimal(found.gamma or "nan") * Decimal(10) ** -digits
 
 
-def _decimal(value: arb, digits: int) -> tuple[str, str]:
-    """A ball as a decimal and what it is off by at most, rounded up."""
+def decimal(value: arb, digits: int) -> tuple[str, str]:
+    """A ball as a decimal, and what that is off by at most, rounded up.
+
+    Parameters
+    ----------
+    value : arb
+    digits : int
+        Six more are written.
+
+    Returns
+    -------
+    tuple of str
+    """
     middle, radius = (_fraction(part) for part in (value.mid(), value.rad()))
     near = Context(prec=digits + 6).divide(Decimal(middle.numerator), Decimal(middle.denominator))
     off = radius + abs(Fraction(near) - middle)

@@ -1,4 +1,4 @@
-"""A fold as it is claimed: a shot cut into steps, and the conditions that it has to meet."""
+"""A fold or an equilibrium as it is claimed: a shot cut into steps, and the conditions that it has to meet."""
 
 from dataclasses import dataclass, field
 
@@ -9,7 +9,7 @@ from towatlas.solve.proof.tip import Tip
 
 @dataclass
 class Chain:
-    """A fold and the shot to it as it is claimed; nothing of it trusted.
+    """A fold or an equilibrium and the shot to it as it is claimed; nothing of it trusted.
 
     Attributes
     ----------
@@ -26,6 +26,8 @@ class Chain:
     steps : list of Step
     end : list of int
         The state and its derivative at the end, over the scales of the last step.
+    speed : float or None
+        Of an equilibrium, exactly this double: the condition gamma = speed takes the place of q = 0.
     """
 
     lam: float
@@ -38,6 +40,7 @@ class Chain:
     tip: Tip | None = None
     steps: list[Step] = field(default_factory=list)
     end: list[int] = field(default_factory=list)
+    speed: float | None = None
 
     @property
     def sign(self) -> int:
@@ -99,7 +102,7 @@ def start_slopes(w_f: arb, a: arb, G: arb) -> list[list[arb]]:
 
 
 def end_slopes(chain: Chain, x: list) -> tuple[list[list], list[list]]:
-    """Derivatives of the three conditions p = +-G, q = 0, t = (w_f + lambda) G in the end state, and in a, G and sigma.
+    """Derivatives of the three conditions p = +-G, q = 0 or G given, t = (w_f + lambda) G in end state, a, G and sigma.
 
     Parameters
     ----------
@@ -124,6 +127,9 @@ def end_slopes(chain: Chain, x: list) -> tuple[list[list], list[list]]:
     along = [sum((a * b for a, b in zip(row, slope, strict=True)), 0 * p) for row in in_state]
     exact = arb(chain.w_f) + arb(chain.lam)
     total = exact if isinstance(p, arb) else float(exact)
+    if chain.speed is not None:
+        in_state[1] = [0] * 8
+        return in_state, [[0, -chain.sign, along[0]], [0, 1, 0], [0, -total, along[2]]]
     return in_state, [[0, -chain.sign, along[0]], [0, 0, along[1]], [0, -total, along[2]]]
 
 
@@ -157,4 +163,5 @@ def end_misses(chain: Chain, x: list[arb], G: arb) -> list[arb]:
     list of arb
     """
     total = arb(chain.w_f) + arb(chain.lam)
-    return [x[P] - chain.sign * G, x[R] * x[4 + P] - x[U] * x[4 + T], x[T] - G * total]
+    second = x[R] * x[4 + P] - x[U] * x[4 + T] if chain.speed is None else G - arb(chain.speed) ** 2
+    return [x[P] - chain.sign * G, second, x[T] - G * total]

@@ -59,7 +59,9 @@ class Floats:
     w: Array
 
 
-def find_chain(lam: float, w_f: float, n: int, a: float, gamma: float, bits: int, order: int) -> tuple[Chain, Floats]:
+def find_chain(
+    lam: float, w_f: float, n: int, a: float, gamma: float, bits: int, order: int, fixed: bool = False
+) -> tuple[Chain, Floats]:
     """A chain about a fold known in floats.
 
     Parameters
@@ -70,6 +72,8 @@ def find_chain(lam: float, w_f: float, n: int, a: float, gamma: float, bits: int
         Offset of the fish gamma^2 |x_f|, and speed.
     bits, order : int
         Of the coefficients of the steps, bits >= 120.
+    fixed : bool
+        For an equilibrium at just this speed, instead of a fold.
 
     Returns
     -------
@@ -82,7 +86,8 @@ def find_chain(lam: float, w_f: float, n: int, a: float, gamma: float, bits: int
     Refused
         If that is no fold.
     """
-    chain = Chain(lam, w_f, n, _dyadic(a, bits), _dyadic(gamma * gamma, bits), bits, order)
+    chain = Chain(lam, w_f, n, _dyadic(a, bits), _square(gamma, bits), bits, order)
+    chain.speed = gamma if fixed else None
     nodes, lengths = _march(chain)
     linear = _expand(chain, nodes, lengths)
     moved = before = np.inf
@@ -99,6 +104,13 @@ def find_chain(lam: float, w_f: float, n: int, a: float, gamma: float, bits: int
 def _dyadic(value: float, bits: int) -> tuple[int, int]:
     power = exponent(value) - bits
     return int(ldexp(value, -power)), power
+
+
+def _square(value: float, bits: int) -> tuple[int, int]:
+    """The square of a float, exactly if the bits suffice."""
+    mantissa, power = _dyadic(value, bits)
+    shift = max(0, (mantissa * mantissa).bit_length() - bits)
+    return mantissa * mantissa >> shift, 2 * power + shift
 
 
 def _start(chain: Chain) -> list[arb]:
@@ -256,19 +268,18 @@ def refine_columns(chain: Chain, linear: Floats) -> None:
     for step in steps:
         step.v, step.w = ([[poly * more for poly in column] for column in columns] for columns in (step.v, step.w))
         step.column_order, step.column_bits = order, bits
-    for _ in range(2):
-        left = [column_defects(step) for step in steps]
-        by = 2 * bits + chain.bits + MORE_BITS
-        sources = np.array(
-            [[[[floats(poly, by, order - 1) for poly in part] for part in parts] for parts in one] for one in left]
-        )
-        v, w = (np.zeros((len(steps), 4, 4, order + 1)) for _ in range(2))
-        linear_series(linear.constants, x, v, -sources[:, :, 0])
-        linear_series(linear.constants, x, w, crossed(linear.constants, y, v) - sources[:, :, 1])
-        for k, step in enumerate(steps):
-            for j in range(4):
-                step.v[j] = [poly + integers(part, bits) for poly, part in zip(step.v[j], v[k, j], strict=True)]
-                step.w[j] = [poly + integers(part, bits) for poly, part in zip(step.w[j], w[k, j], strict=True)]
+    left = [column_defects(step) for step in steps]
+    by = 2 * bits + chain.bits + MORE_BITS
+    sources = np.array(
+        [[[[floats(poly, by, order - 1) for poly in part] for part in parts] for parts in one] for one in left]
+    )
+    v, w = (np.zeros((len(steps), 4, 4, order + 1)) for _ in range(2))
+    linear_series(linear.constants, x, v, -sources[:, :, 0])
+    linear_series(linear.constants, x, w, crossed(linear.constants, y, v) - sources[:, :, 1])
+    for k, step in enumerate(steps):
+        for j in range(4):
+            step.v[j] = [poly + integers(part, bits) for poly, part in zip(step.v[j], v[k, j], strict=True)]
+            step.w[j] = [poly + integers(part, bits) for poly, part in zip(step.w[j], w[k, j], strict=True)]
 
 
 def _set_last(step: Step, h: float, more: float = 0.0) -> None:

@@ -18,7 +18,7 @@ DEEPEST = 24
 
 
 def zeros(chain: Chain, claim: Claim, steps: list[StepBounds]) -> int:
-    """Number of zeros of q from the fish to the end of a verified chain, that at the end included.
+    """Number of zeros of q from the fish to the end of a verified chain: of a fold, that at the end included.
 
     Parameters
     ----------
@@ -39,14 +39,17 @@ def zeros(chain: Chain, claim: Claim, steps: list[StepBounds]) -> int:
     """
     # Beyond z = 1 of the last step a shot of the box may go on, as far as sigma is not known.
     hull = end_hull(chain, claim)
-    beyond = hull[4 + U] + hull[P] * hull[4 + T]
-    if not (beyond != 0 and claim.unknowns[2] < binary(chain.steps[-1].h[0], chain.steps[-1].h[1] - DEEPEST - 1)):
-        raise Refused("WRAPPED", "the sign of v at the end of the cable is not proved")
+    q_end, v_end = hull[R] * hull[4 + P] - hull[U] * hull[4 + T], hull[4 + U] + hull[P] * hull[4 + T]
+    fold = chain.speed is None
+    if not ((v_end if fold else q_end) != 0):
+        raise Refused("WRAPPED", "the sign at the end of the cable is not proved")
+    if not claim.unknowns[2] < binary(chain.steps[-1].h[0], chain.steps[-1].h[1] - DEEPEST - 1):
+        raise Refused("WRAPPED", "the end of the cable is not proved to lie in the last piece")
     with working_bits(BITS):
         count = 0
         for k, bounds in enumerate(steps):
             q, v = _polynomials(chain, k, bounds.off(*spread(chain, k, claim.nodes[k])))
-            count += _count(q, v, arb(0), arb(1), k == len(steps) - 1, k)
+            count += _count(q, v, arb(0), arb(1), fold and k == len(steps) - 1, k)
     return count
 
 

@@ -14,7 +14,7 @@ from math import ldexp
 import numpy as np
 from numpy.typing import NDArray
 
-from towatlas.solve.proof.arithmetic import exponent, fmpz, fmpz_poly
+from towatlas.solve.proof.arithmetic import Refused, exponent, fmpz, fmpz_poly
 
 Array = NDArray[np.float64]
 P, U, T, R = range(4)
@@ -72,7 +72,7 @@ class Step:
         for more in self.powers:
             shift = power + more + self.bits + MORE_BITS
             if shift < 0 and mantissa % (1 << -shift):
-                raise ArithmeticError("a step whose length is no multiple of the last bit of its constants")
+                raise Refused("WRAPPED", "a step whose length is no multiple of the last bit of its constants")
             made.append(mantissa << shift if shift >= 0 else mantissa >> -shift)
         return made
 
