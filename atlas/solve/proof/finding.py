@@ -89,9 +89,12 @@ def find_chain(
     chain = Chain(lam, w_f, n, _dyadic(a, bits), _square(gamma, bits), bits, order)
     chain.speed = gamma if fixed else None
     nodes, lengths = _march(chain)
-    linear = _expand(chain, nodes, lengths)
+    _expand(chain, nodes, lengths)
+    linear = _columns(chain)
     moved = before = np.inf
-    for _ in range(MOST_ROUNDS):
+    for k in range(MOST_ROUNDS):
+        # A march in floats may end far from where it should: after one round all nodes are right.
+        linear = _columns(chain) if k == 1 else linear
         moved = _improve(chain, linear)
         if moved * LEFT < ldexp(1.0, -bits):
             return chain, linear
@@ -207,7 +210,7 @@ def _float_series(state: list[float], h: float) -> list[list[float]]:
     return parts
 
 
-def _expand(chain: Chain, nodes: list[list[float]], lengths: list[float]) -> Floats:
+def _expand(chain: Chain, nodes: list[list[float]], lengths: list[float]) -> None:
     """Steps with their scales and polynomials, from nodes in floats."""
     order, bits = chain.order, chain.bits
     for k, h in enumerate(lengths):
@@ -239,17 +242,26 @@ def _expand(chain: Chain, nodes: list[list[float]], lengths: list[float]) -> Flo
     y = np.zeros((len(steps), 1, 4, order + 1))
     y[:, 0, :, 0] = begin[:, 4:]
     linear_series(constants, x, y, None)
+    for k, step in enumerate(steps):
+        step.x = [integers(part, bits) for part in x[k]]
+        step.y = [integers(part, bits) for part in y[k, 0]]
+
+
+def _columns(chain: Chain) -> Floats:
+    """All steps in floats, and their columns made from those."""
+    steps, bits, order = chain.steps, chain.bits, chain.order
+    constants = np.array([step.real_constants() for step in steps])
+    x = np.array([[floats(poly, bits, order) for poly in step.x] for step in steps])
+    y = np.array([[floats(poly, bits, order) for poly in step.y] for step in steps])
     short = FLOAT_COLUMNS[0] + 1
     v, w = (np.zeros((len(steps), 4, 4, short)) for _ in range(2))
     v[:, range(4), range(4), 0] = 1.0
     linear_series(constants, x[..., :short], v, None)
-    linear_series(constants, x[..., :short], w, crossed(constants, y[:, 0, :, :short], v))
+    linear_series(constants, x[..., :short], w, crossed(constants, y[..., :short], v))
     for k, step in enumerate(steps):
-        step.x = [integers(part, bits) for part in x[k]]
-        step.y = [integers(part, bits) for part in y[k, 0]]
         step.v = [[integers(part, FLOAT_COLUMNS[1]) for part in column] for column in v[k]]
         step.w = [[integers(part, FLOAT_COLUMNS[1]) for part in column] for column in w[k]]
-    return Floats(constants, x, y[:, 0], v, w)
+    return Floats(constants, x, y, v, w)
 
 
 def refine_columns(chain: Chain, linear: Floats) -> None:
