@@ -18,7 +18,7 @@ from towatlas.results import Equilibria
 from towatlas.results_motion import Stability
 
 SEED = 7048
-SHAPES = 200
+SHAPES = 60
 # Shapes of one cable that are looked at, at most.
 EACH = 2
 RTOL = 1e-12
