@@ -15,10 +15,12 @@ from benchmarks import (
     methods_shots,
     peers_drag,
     peers_folds,
+    peers_stability,
     report,
     samples,
     samples_drag,
     shots,
+    stability,
     targets,
     targets_drag,
 )
@@ -165,6 +167,41 @@ def test_a_bare_tip_of_the_peers_is_ours():
 
 def test_targets_with_drag():
     assert all(target.value > 0.0 for target in targets_drag.measure(8, (2, 2), 16, full=False))
+
+
+def test_growth_rates(tmp_path):
+    """Each method converges; what its order says of it, not what it was."""
+    rows = {row.method: row for row in stability.measure(full=False)}
+    bounds = {
+        stability.OURS: 1e-14,
+        "Evans, SciPy DOP853": 1e-7,
+        "Galerkin, panels of 5": 1e-6,
+        "finite differences, eigs": 1e-3,
+        "chain of links": 1e-2,
+    }
+    assert set(rows) == set(bounds)
+    for method, bound in bounds.items():
+        assert rows[method].quantile("sigma", 0.5) < bound, method
+    figures.stability(list(rows.values()), tmp_path / "stability")
+    assert {path.suffix for path in tmp_path.iterdir()} == {".svg", ".png"}
+
+
+def test_finite_differences_are_of_second_order():
+    case = stability.CASES[0]
+    errors = [
+        abs(peers_stability.by_finite_differences(case.found, case.found.expected, stability.reference()[0], n) - exact)
+        for n in (100, 200)
+        for exact in stability.reference()[:1]
+    ]
+    assert errors[0] / errors[1] == pytest.approx(4.0, abs=0.2)
+
+
+def test_the_file_of_growth_rates_holds_what_it_says():
+    """The shortest of its shots computed anew, on a mesh that is none of this project's."""
+    k = [case.name for case in stability.CASES].index("water")
+    case, exact = stability.CASES[k], stability.reference()[k]
+    again = peers_stability.exact(case.found, case.found.expected, exact * (1.0 + 1e-6), np.ones(40))
+    assert abs(again - exact) < 1e-15
 
 
 def test_lookup(table):
