@@ -71,7 +71,7 @@ def test_one_of_many_has_its_own_share():
 
 def test_with_more_patience_longer_shots_with_drag_are_made():
     # A bare stranded cable in drag so strong that it trails along its circle with hardly any tension.
-    row = System.of(lam=0.6, w_f=0.0, C=4800.0, C_s=165.0, b_s=0.16).row()
+    row = System.of(lam=0.6, w_f=0.0, C=9600.0, C_s=330.0, b_s=0.16).row()
     with patience(30.0):
         few = shoot(1.1, 1.3, row, jets_of(0))
     with patience(300.0):
