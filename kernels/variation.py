@@ -155,6 +155,8 @@ KEPT_ROWS = np.array([T, *P.ravel(), *TA.ravel(), *EP.ravel()])
 # Orders of their series: the equations know no more.
 TERMS = np.int64(ORDER)
 TWO, SIX = np.int64(2), np.int64(6)
+# Of the series of P, whose entries are at most 1, at the end of a step: its last terms.
+LEFT = 1e-15
 
 
 @helper
@@ -176,8 +178,22 @@ def _norm(c, first, lane):
 
 
 @helper
+def _turn_left(c, k, lane):
+    """Largest coefficient of order k of P."""
+    largest = 0.0
+    for at in range(P[0, 0], P[0, 0] + 9):
+        largest = max(largest, abs(c[(at * KEPT + k) * LANES + lane]))
+    return largest
+
+
+@helper
 def _shorten(c, p, h, lane, reach, bound):
-    """Step within h in which solutions for |sigma| <= reach change by a factor of about exp(bound)."""
+    """Step within h in which solutions for |sigma| <= reach change by a factor of about exp(bound), and which the
+    series of P resolves: in a layer, where the cable turns, the shot's own step need not."""
+    for k in range(ORDER - 2, ORDER):
+        left = _turn_left(c, k, lane)
+        if left * h**k > LEFT:
+            h = (LEFT / left) ** (1.0 / k)
     tension = c[T * KEPT * LANES + lane]
     fast = reach + 1.0
     wave = np.sqrt(fast * (tension * fast + _norm(c, TA[0, 0], lane)))

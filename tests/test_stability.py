@@ -176,6 +176,21 @@ def test_steps_twice_as_short_change_nothing():
             assert np.abs(roots.sigma - leading).max() < 1e-12, (cable, k)
 
 
+def test_layers_at_high_speed_are_resolved():
+    """The steps of a shot keep its force, but not the direction of a cable that turns within a layer: those of the
+    motion are shorter there. Against 19 digits, and against steps so short that they resolve it anyway."""
+    found = towatlas.equilibria(10.0, 1.0, 8.0)
+    leading = towatlas.stability_of(found).eigenvalues[found.expected][0] / found.gamma
+    # docs/data/reference_stability.csv.
+    assert abs(leading - (0.084635044324686284 + 0.69785036709449266j)) < 1e-13
+    found = towatlas.stability(10.0, 0.0, 10.0)
+    for k in range(len(found)):
+        leading = found.eigenvalues[k][:1] / found.equilibria.gamma
+        roots, good = polish(motion_of(found.equilibria, k, bound=0.2), leading, leading)
+        assert good.all()
+        assert np.abs(roots.sigma - leading).max() < 1e-13, k
+
+
 def differences(function, small=1e-6):
     """Central ones, a column an axis."""
     steps = small * np.eye(3)
