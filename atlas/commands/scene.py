@@ -22,6 +22,7 @@ from towatlas.scene.margins import margins_of
 from towatlas.scene.models import QUESTIONS, check_questions
 from towatlas.scene.scene import KNOT, MODELS, Scene
 from towatlas.scene.sensitivities import sensitivities_of
+from towatlas.scene.verdicts import verdicts_of
 from towatlas.tables.atlas import Atlas, open_atlas
 
 MEDIA = {"vacuum": "a vacuum", "air": "a nondense fluid", "water": "a dense fluid"}
@@ -45,7 +46,7 @@ def add(commands: Any) -> None:
         help="critical speeds and shapes of a towing scene in real units",
         description="Dimensionless groups, critical speeds and equilibria of a scene, a TOML file in real units, by "
         "the least model whose answers are those of the larger ones within the scene's tolerance. "
-        "It ends with the largest tension, and the nearest jumps with what they cost. "
+        "It ends with which shapes last, the largest tension, and the nearest jumps with what they cost. "
         f"Scenes that come with the package, by name: {', '.join(shipped_scenes())}.",
     )
     parser.add_argument("file", metavar="FILE", help="a scene, - for one on standard input; see docs/scenes.md")
@@ -69,9 +70,6 @@ def add(commands: Any) -> None:
     )
     parser.add_argument(
         "--sensitivities", action="store_true", help="also how jumps, depth and tensions move with each key"
-    )
-    parser.add_argument(
-        "--stability", action="store_true", help="also which shapes last, with growth times and frequencies"
     )
     add_atlas(parser)
     where = parser.add_mutually_exclusive_group()
@@ -148,14 +146,12 @@ def _run(options: argparse.Namespace) -> int:
     answer = answer_scene(scene, atlas, options.model, options.asked, options.compare)
     slopes = sensitivities_of(answer) if options.sensitivities else None
     found = margins_of(answer, slopes)
-    motion = verdicts.stability_of_scene(answer) if options.stability else None
-    ending = margins.lines_of(found, answer)
-    if motion is not None:
-        ending = [*verdicts.lines_of(motion, answer), "", *ending]
+    lasting = verdicts_of(answer)
+    ending = [*verdicts.lines_of(lasting, answer), "", *margins.lines_of(found, answer)]
     if options.out:
         write_scene(answer, options.out, ending, options.compare)
     elif options.json:
-        print_json(object_of(answer) | margins.as_object(found, asked, slopes) | verdicts.as_object(motion, answer))
+        print_json(object_of(answer) | margins.as_object(found, asked, slopes) | verdicts.as_object(lasting, answer))
     else:
         table = [*margins.slope_lines(slopes), ""] if slopes else []
         print("\n".join([text_of(answer, options.compare), "", *table, *ending]))
