@@ -12,14 +12,17 @@ from towatlas.commands import scene_margins as margins
 from towatlas.commands import scene_stability as verdicts
 from towatlas.commands.common import add_atlas, add_patience, print_json, real, say
 from towatlas.commands.common import speed as dimensionless_speed
+from towatlas.commands.quantities import Range, quantity, range_of
 from towatlas.commands.scene_files import check_out, write_scene
+from towatlas.commands.scene_seen import as_object, lines_of
 from towatlas.kernels import status
 from towatlas.scene.choice import Choice, percent
+from towatlas.scene.diagrams import SceneDiagram, scene_diagram
 from towatlas.scene.file import read_scene, scene_of_text, shipped_scenes
 from towatlas.scene.jumps import LOOKED, NEAR, Jumps, SceneAnswer, answer_scene
 from towatlas.scene.library import LARGEST
 from towatlas.scene.margins import margins_of
-from towatlas.scene.models import QUESTIONS, check_questions
+from towatlas.scene.models import QUESTIONS, check_questions, with_drag
 from towatlas.scene.scene import KNOT, MODELS, Scene
 from towatlas.scene.sensitivities import sensitivities_of
 from towatlas.scene.verdicts import verdicts_of
@@ -71,6 +74,12 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--sensitivities", action="store_true", help="also how jumps, depth and tensions move with each key"
     )
+    parser.add_argument(
+        "--seen",
+        type=range_of("m/s"),
+        metavar="LOW:HIGH",
+        help="also what is seen as the speed rises from LOW to HIGH, as 1kn:8kn, and falls back; takes longer",
+    )
     add_atlas(parser)
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--json", action="store_true", help="one object instead of tables, with all of it")
@@ -90,27 +99,6 @@ def _questions(text: str) -> tuple[str, ...]:
         return check_questions([name.strip() for name in text.split(",") if name.strip()])
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def quantity(unit: str, bare: str | None = None) -> Any:
-    """The type of an argument with a unit, positive; a bare number is SI, or in the unit named."""
-
-    def positive(text: str) -> float:
-        from towatlas.scene.units import parse_quantity
-
-        try:
-            value: float | str = float(text)
-        except ValueError:
-            value = text
-        try:
-            number = parse_quantity("value", value, unit, bare)
-        except ValueError as error:
-            raise argparse.ArgumentTypeError(str(error).removeprefix("value = ")) from None
-        if number <= 0.0:
-            raise argparse.ArgumentTypeError(f"{text} is not positive")
-        return number
-
-    return positive
 
 
 def add_speed(parser: argparse.ArgumentParser, rate: Any = dimensionless_speed) -> None:
@@ -147,11 +135,14 @@ def _run(options: argparse.Namespace) -> int:
     slopes = sensitivities_of(answer) if options.sensitivities else None
     found = margins_of(answer, slopes)
     lasting = verdicts_of(answer)
-    ending = [*verdicts.lines_of(lasting, answer), "", *margins.lines_of(found, answer)]
+    history = _history(answer, options.seen) if options.seen else None
+    known = lines_of(history) if history else [_how_to_ask(scene)]
+    ending = [*verdicts.lines_of(lasting, answer), *known, "", *margins.lines_of(found, answer)]
     if options.out:
         write_scene(answer, options.out, ending, options.compare)
     elif options.json:
-        print_json(object_of(answer) | margins.as_object(found, asked, slopes) | verdicts.as_object(lasting, answer))
+        parts = margins.as_object(found, asked, slopes) | verdicts.as_object(lasting, answer)
+        print_json(object_of(answer) | parts | {"seen": as_object(history) if history else None})
     else:
         table = [*margins.slope_lines(slopes), ""] if slopes else []
         print("\n".join([text_of(answer, options.compare), "", *table, *ending]))
@@ -161,6 +152,17 @@ def _run(options: argparse.Namespace) -> int:
     for code in codes - {status.OK}:
         say(f"a critical speed could not be had: {status.SENTENCES[code]}")
     return margins.judge(found, answer.choice.model, asked)
+
+
+def _history(answer: SceneAnswer, over: Range) -> SceneDiagram:
+    """Every branch over a range of speed, by the model that answers, or in a fluid the least with drag."""
+    scene, choice = answer.scene, answer.choice
+    model = choice.model if choice.forced else with_drag(scene, choice.model)
+    return scene_diagram(scene, speed=(over.low, over.high), model=model, unit=over.unit, size=over.size)
+
+
+def _how_to_ask(scene: Scene) -> str:
+    return f"what is seen as the speed rises and falls: --seen {0.5 * scene.speed:.2g}:{2.0 * scene.speed:.2g} (m/s)"
 
 
 def speeds(scene: Scene, gamma: float) -> dict[str, float | None]:

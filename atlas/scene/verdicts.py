@@ -9,7 +9,9 @@ from towatlas.effort import at_most
 from towatlas.kernels import status
 from towatlas.results import Equilibria
 from towatlas.scene.jumps import SceneAnswer
+from towatlas.scene.models import system_of, with_drag
 from towatlas.scene.scene import MODELS, Scene, patient_with
+from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.stability import looked_at, spectrum_of
 
 # Of the patience with a scene; the shapes themselves stand without.
@@ -135,6 +137,39 @@ def verdict_of(scene: Scene, found: Equilibria, k: int) -> Verdict:
         code=answer.status,
         reason="" if known else status.SENTENCES[answer.status],
     )
+
+
+def verdict_with_drag(scene: Scene, model: str, found: Equilibria, k: int) -> Verdict:
+    """What becomes of a small push to one shape, in a fluid by a model with drag, if that has the same shape.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : str
+        By which the shape was found, one of MODELS.
+    found : Equilibria
+    k : int
+        Which of them.
+
+    Returns
+    -------
+    Verdict
+        Not known where the model with drag has no such shape within the scene's tolerance.
+    """
+    other = with_drag(scene, model)
+    if other == model:
+        return verdict_of(scene, found, k)
+    try:
+        larger = solve_equilibria(system_of(scene, other), scene.gamma)
+    except ArithmeticError as error:
+        return Verdict("unknown", nan, nan, nan, -1, status.NOT_COUNTED, str(error))
+    here = np.array([found.x_f[k], found.y_f[k], found.z_f[k]])
+    apart = np.linalg.norm(np.stack([larger.x_f, larger.y_f, larger.z_f], axis=1) - here, axis=1)
+    at = int(np.argmin(apart))
+    if not apart[at] <= scene.tolerance * np.linalg.norm(here - [1.0, 0.0, 0.0]):
+        reason = f"the {other} model has no such shape, and nothing damps in the {model} model"
+        return Verdict("unknown", nan, nan, nan, -1, status.NOT_COUNTED, reason)
+    return verdict_of(scene, larger, at)
 
 
 def verdicts_of(answer: SceneAnswer) -> Verdicts:
