@@ -133,7 +133,7 @@ def _run(options: argparse.Namespace) -> int:
     atlas = atlas_if_any(options.atlas)
     answer = answer_scene(scene, atlas, options.model, options.asked, options.compare)
     slopes = sensitivities_of(answer) if options.sensitivities else None
-    found = margins_of(answer, slopes)
+    found = margins_of(answer, slopes, 0.0 if asked is None else asked / scene.speed)
     lasting = verdicts_of(answer)
     history = _history(answer, options.seen) if options.seen else None
     known = lines_of(history) if history else [_how_to_ask(scene)]
