@@ -16,13 +16,15 @@ from towatlas.commands.scene_seen import lines_of
 from towatlas.plot.diagram import plot_diagram
 from towatlas.scene.designs import with_length
 from towatlas.scene.diagrams import scene_diagram, to_starboard
+from towatlas.scene.edges import flutter_edges
 from towatlas.scene.file import make_scene, read_scene
 from towatlas.scene.jumps import answer_scene
 from towatlas.scene.models import system_of
 from towatlas.scene.verdicts import verdicts_of
 from towatlas.solve.equilibria import solve_equilibria
+from towatlas.solve.flutter import flutter_of
 from towatlas.solve.folds import solve_folds_between
-from towatlas.solve.seen import Jump, Stretch
+from towatlas.solve.seen import Jump, Stretch, kind_at, radius_at
 from towatlas.solve.stability import stability_of
 
 
@@ -175,3 +177,49 @@ class TestCommands:
         code, out, err = run(capsys, "diagram", *arguments)
         assert (code, out) == (2, "")
         assert message in err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_no_answer_contradicts_another(seed):
+    """Random scenes in air and water: verdicts of scenes, windows of flutter, edges and the diagram."""
+    rng = np.random.default_rng(seed)
+    radius, water = float(10.0 ** rng.uniform(-1.0, 1.0)), bool(seed % 2)
+    table = {
+        "cable": {
+            "length": radius * float(rng.uniform(2.0, 8.0)),
+            "mass_per_length": 1.0,
+            "diameter": 0.02 if water else 0.01,
+            "drag_coefficient": 1.2,
+        },
+        "fish": {"mass": radius * float(rng.uniform(0.5, 5.0)), "diameter": 0.05, "drag_coefficient": 0},
+        "tow": {"radius": radius, "speed": 1.0},
+        "fluid": {"density": 1000.0 if water else 1.2},
+    }
+    scene = make_scene(table).at(gamma=float(rng.uniform(0.4, 1.5)))
+    model, ends = ("water" if water else "air"), (0.9 * scene.speed, 1.1 * scene.speed)
+    with towatlas.patience(300.0):
+        drawn = scene_diagram(scene, speed=ends, model=model)
+        system, gamma = to_starboard(system_of(scene, model), scene.gamma)
+        windows = flutter_of(system, 0.9 * gamma, 1.1 * gamma).windows
+        edges = flutter_edges(answer_scene(scene, model=model, asked=("nodes",)))
+    points = {point.value for branch in drawn.branches for point in branch.points}
+    for window in windows:
+        for edge in (window.low, window.high):
+            assert min(abs(edge * scene.speed / gamma / value - 1.0) for value in points) < 1e-9
+    for edge in (edges.below, edges.above):
+        if edge is not None and ends[0] < edge.speed < ends[1]:
+            assert min(abs(edge.speed / value - 1.0) for value in points) < 1e-8
+    for speed in rng.uniform(*ends, 6):
+        if min(abs(speed / value - 1.0) for value in points) < 2e-3:
+            continue
+        answer = answer_scene(scene.at(speed=float(speed)), model=model, asked=("nodes",))
+        shapes, found = verdicts_of(answer).shapes, answer.equilibria
+        there = [one for one in drawn.branches if one.points[0].value < speed < one.points[-1].value]
+        assert len(there) == len(found)
+        for branch in there:
+            k = int(np.argmin(np.abs(np.log(found.r_f * scene.radius / radius_at(branch, speed)))))
+            drawn_as, said = kind_at(branch, speed), shapes[k].kind
+            # The strongest of a stretch names it, or that some of it was not counted.
+            allowed = drawn_as in (said, "unknown") or {drawn_as, said} <= {"weak", "flutter", "divergence"}
+            assert allowed, (speed, branch, said)
