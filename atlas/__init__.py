@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from towatlas.solve.flutter import flutter
     from towatlas.solve.folds import folds
     from towatlas.solve.many import equilibria_many
+    from towatlas.solve.proof.certificates import Certificate, certify
+    from towatlas.solve.proof.states import CertifiedEquilibria, certify_equilibria
     from towatlas.solve.shapes import shape, shape_of
     from towatlas.solve.stability import stability, stability_of
     from towatlas.system import System
@@ -34,6 +36,8 @@ __all__ = [
     "Atlas",
     "AtlasFileError",
     "Branch",
+    "Certificate",
+    "CertifiedEquilibria",
     "CriticalStates",
     "Cusps",
     "Diagram",
@@ -47,6 +51,8 @@ __all__ = [
     "TooMuchWork",
     "Window",
     "answer_scene",
+    "certify",
+    "certify_equilibria",
     "cusps",
     "design",
     "diagram",
@@ -87,6 +93,8 @@ _HOMES = {
     "solve.flutter": ("flutter",),
     "solve.folds": ("folds",),
     "solve.many": ("equilibria_many",),
+    "solve.proof.certificates": ("Certificate", "certify"),
+    "solve.proof.states": ("CertifiedEquilibria", "certify_equilibria"),
     "solve.shapes": ("shape", "shape_of"),
     "solve.stability": ("stability", "stability_of"),
     "system": ("System",),
