@@ -120,6 +120,37 @@ def patience(seconds: float = SECONDS, each: float | None = None) -> Iterator[No
         _budget.reset(token)
 
 
+@contextmanager
+def at_most(share: float) -> Iterator[None]:
+    """Allow what is within no more than a share of the patience there is, and no more than is left of it.
+
+    Parameters
+    ----------
+    share : float
+        [-], > 0, at most 1.
+
+    Returns
+    -------
+    context manager
+        For `with`; for what an answer can do without.
+
+    Raises
+    ------
+    TooMuchWork
+        As `patience`.
+    """
+    budget = _budget.get()
+    if budget is None:
+        yield
+        return
+    seconds = min(share * budget.seconds, max(0.0, budget.seconds - budget.used))
+    token = _budget.set(_Budget(seconds, _clock(), budget.each))
+    try:
+        yield
+    finally:
+        _budget.reset(token)
+
+
 def scaled(limit: int, most: int) -> int:
     """A limit of one call of a kernel, which grows and shrinks with the patience of the caller.
 

@@ -147,14 +147,14 @@ class Point:
     ----------
     kind : str
         "fold", "hopf", "krein", "range" or "unknown", as of `Window`.
-    gamma : float
-        Speed Omega sqrt(R/g) [-], > 0.
+    value : float
+        Of what moves, as of `Diagram`.
     x_f, r_f, z_f, tension : float
         As of `Branch`; at a fold computed, elsewhere between samples 1 % apart.
     """
 
     kind: str
-    gamma: float
+    value: float
     x_f: float
     r_f: float
     z_f: float
@@ -163,14 +163,16 @@ class Point:
 
 @dataclass(frozen=True, repr=False)
 class Branch:
-    """One branch of shapes over the speed.
+    """One branch of shapes over the speed, or over the length of the cable.
 
     Attributes
     ----------
     name : str
-        At its highest speed, as of `Equilibria`.
+        Where that is highest, as of `Equilibria`.
+    value : ndarray, shape (samples,)
+        Of what moves, rising, as of `Diagram`.
     gamma : ndarray, shape (samples,)
-        Speeds Omega sqrt(R/g) [-], rising.
+        Speeds Omega sqrt(R/g) [-].
     nodes : ndarray of int, shape (samples,)
         Sign changes of x along the cable [-], >= 0.
     x_f, r_f, z_f : ndarray, shape (samples,)
@@ -184,12 +186,13 @@ class Branch:
     kind : ndarray of str, shape (samples,)
         As of `Stability`.
     points : tuple of Point
-        Where the branch begins, changes and ends, in rising speed.
+        Where the branch begins, changes and ends, in rising order.
     between : tuple of str
         The kind that it is of between each of them and the next.
     """
 
     name: str
+    value: Array
     gamma: Array
     nodes: Integers
     x_f: Array
@@ -204,26 +207,28 @@ class Branch:
     between: tuple[str, ...]
 
     def __repr__(self) -> str:
-        text = f"Branch {self.name!r}: gamma {self.points[0].gamma:.6g} ({self.points[0].kind})"
+        text = f"Branch {self.name!r}: {self.points[0].value:.6g} ({self.points[0].kind})"
         for k, (kind, point) in enumerate(zip(self.between, self.points[1:], strict=True)):
             # What goes on as it was is no change.
             if k + 1 == len(self.between) or self.between[k + 1] != kind:
-                text += f" {kind} {point.gamma:.6g} ({point.kind})"
+                text += f" {kind} {point.value:.6g} ({point.kind})"
         return text
 
 
 @dataclass(frozen=True)
 class Diagram:
-    """All branches of shapes of one cable over its speed.
+    """All branches of shapes of one cable over its speed, or over its length.
 
     Attributes
     ----------
     system : System
         The cable, its fish and the medium.
+    moved : str
+        "gamma", the speed Omega sqrt(R/g), or "lam", the length over tow radius.
     low, high : float
-        Speeds looked at [-], > 0.
+        Between which of its values [-], > 0.
     branches : tuple of Branch
-        In the order of their lowest speeds, from the outermost inwards.
+        In the order of their lowest values, from the outermost inwards.
     complete : bool
         Whether all shapes were made out and counted.
     looked_at : str
@@ -231,6 +236,7 @@ class Diagram:
     """
 
     system: System
+    moved: str
     low: float
     high: float
     branches: tuple[Branch, ...]
@@ -243,54 +249,72 @@ class Diagram:
         Returns
         -------
         xarray.Dataset
-            gamma, nodes, x_f, r_f, z_f, tension, growth, frequency, unstable and lasts over (branch, sample), nan or -1
-            beyond the last of a branch; lasts is 1 where the kind is "stable", 0 where it is another, -1 if unknown.
-            point_gamma and point_kind over (branch, point), name over branch.
+            What moves, gamma or lam, nodes, x_f, r_f, z_f, tension, growth, frequency, unstable and lasts over (branch,
+            sample), nan or -1 beyond the last of a branch; lasts is 1 where the kind is "stable", 0 where it is
+            another, -1 if unknown. point_gamma, or point_lam, and point_kind over (branch, point), name over branch.
         """
-        import xarray
-
-        size = max(len(branch.gamma) for branch in self.branches)
-        points = max(len(branch.points) for branch in self.branches)
-
-        def filled(columns: list[Array], width: int, missing: float, kind: type) -> Array:
-            out: Array = np.full((len(columns), width), missing, kind)
-            for row, column in zip(out, columns, strict=True):
-                row[: len(column)] = column
-            return out
-
-        variables: dict[str, Any] = {}
-        for name, text in _DIAGRAM.items():
-            whole = name in ("nodes", "unstable")
-            columns = [getattr(branch, name) for branch in self.branches]
-            data = filled(columns, size, -1 if whole else np.nan, np.int32 if whole else np.float64)
-            variables[name] = (("branch", "sample"), data, {"long_name": text, "units": "1"})
-        lasts = [np.where(b.kind == "unknown", -1, (b.kind == "stable").astype(int)) for b in self.branches]
-        about = {"long_name": "whether the shape lasts, -1 if not known", "units": "1"}
-        variables["lasts"] = (("branch", "sample"), filled(lasts, size, -1, np.int8), about)
-        speeds = [np.array([point.gamma for point in branch.points]) for branch in self.branches]
-        about = {"long_name": "speed at which the branch begins, changes or ends", "units": "1"}
-        variables["point_gamma"] = (("branch", "point"), filled(speeds, points, np.nan, np.float64), about)
-        kinds = [[point.kind for point in b.points] + [""] * (points - len(b.points)) for b in self.branches]
-        variables["point_kind"] = (("branch", "point"), np.array(kinds, np.str_), {"long_name": "what is there"})
-        names = np.array([branch.name for branch in self.branches], np.str_)
-        variables["name"] = (("branch",), names, {"long_name": "name of the branch at its highest speed"})
-        facts = {name: getattr(self.system, name) for name in COLUMNS}
-        attributes = {
-            "title": "Branches of shapes of a towed cable",
-            "Conventions": "CF-1.11",
-            "looked_at": self.looked_at,
-        }
-        return xarray.Dataset(variables, attrs=attributes | facts)
+        facts = {name: getattr(self.system, name) for name in COLUMNS if name != self.moved}
+        if self.moved == "lam":
+            facts["gamma"] = float(self.branches[0].gamma[0])
+        found = dataset_of(self.branches, self.moved, dict.fromkeys(DIAGRAM_UNITS, "1"))
+        return found.assign_attrs(looked_at=self.looked_at, **facts)
 
 
+def dataset_of(branches: tuple[Branch, ...], moved: str, units: dict[str, str]) -> "xarray.Dataset":
+    """Branches as a dataset.
+
+    Parameters
+    ----------
+    branches : tuple of Branch
+    moved : str
+        Name of what moves.
+    units : dict of str
+        Of "value", "position", "tension" and "rate", that of growth and frequency.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `Diagram.to_dataset`.
+    """
+    import xarray
+
+    size, points = (max(len(of(branch)) for branch in branches) for of in (lambda b: b.value, lambda b: b.points))
+
+    def filled(columns: list[Array], width: int, missing: float, kind: type) -> Array:
+        out: Array = np.full((len(columns), width), missing, kind)
+        for row, column in zip(out, columns, strict=True):
+            row[: len(column)] = column
+        return out
+
+    variables: dict[str, Any] = {}
+    for name, (text, unit) in _DIAGRAM.items():
+        whole = name in ("nodes", "unstable")
+        columns = [getattr(branch, name) for branch in branches]
+        data = filled(columns, size, -1 if whole else np.nan, np.int32 if whole else np.float64)
+        about = {"long_name": text, "units": units.get(unit, "1")}
+        variables[moved if name == "value" else name] = (("branch", "sample"), data, about)
+    lasts = [np.where(b.kind == "unknown", -1, (b.kind == "stable").astype(int)) for b in branches]
+    about = {"long_name": "whether the shape lasts, -1 if not known", "units": "1"}
+    variables["lasts"] = (("branch", "sample"), filled(lasts, size, -1, np.int8), about)
+    values = [np.array([point.value for point in branch.points]) for branch in branches]
+    about = {"long_name": "where the branch begins, changes or ends", "units": units["value"]}
+    variables[f"point_{moved}"] = (("branch", "point"), filled(values, points, np.nan, np.float64), about)
+    kinds = [[point.kind for point in b.points] + [""] * (points - len(b.points)) for b in branches]
+    variables["point_kind"] = (("branch", "point"), np.array(kinds, np.str_), {"long_name": "what is there"})
+    names = np.array([branch.name for branch in branches], np.str_)
+    variables["name"] = (("branch",), names, {"long_name": "name of the branch where what moves is highest"})
+    return xarray.Dataset(variables, attrs={"title": "Branches of shapes of a towed cable", "Conventions": "CF-1.11"})
+
+
+DIAGRAM_UNITS = ("value", "position", "tension", "rate")
 _DIAGRAM = {
-    "gamma": "speed Omega sqrt(R/g)",
-    "nodes": "sign changes of x along the cable",
-    "x_f": "position of the fish over tow radius",
-    "r_f": "distance of the fish from the axis over tow radius",
-    "z_f": "depth of the fish below the tow point over tow radius",
-    "tension": "tension at the tow point over (mu + rho A) g R",
-    "growth": "growth of the leading eigenvalue over sqrt(g/R)",
-    "frequency": "frequency of the leading eigenvalue over sqrt(g/R)",
-    "unstable": "number of eigenvalues that grow, -1 if not counted",
+    "value": ("what moves", "value"),
+    "nodes": ("sign changes of x along the cable", ""),
+    "x_f": ("radial position of the fish", "position"),
+    "r_f": ("distance of the fish from the axis", "position"),
+    "z_f": ("depth of the fish below the tow point", "position"),
+    "tension": ("tension at the tow point", "tension"),
+    "growth": ("growth of the leading eigenvalue", "rate"),
+    "frequency": ("frequency of the leading eigenvalue", "rate"),
+    "unstable": ("number of eigenvalues that grow, -1 if not counted", ""),
 }

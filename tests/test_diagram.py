@@ -20,7 +20,7 @@ def found():
 def test_branches_are_the_shapes_of_single_speeds(found):
     for gamma in (0.35, 0.5, 0.7):
         shapes = towatlas.equilibria(10.0, 1.0, gamma)
-        there = [b for b in found.branches if b.points[0].gamma < gamma < b.points[-1].gamma]
+        there = [b for b in found.branches if b.points[0].value < gamma < b.points[-1].value]
         assert len(there) == len(shapes)
         for branch in there:
             k = list(shapes.branch).index(branch.name)
@@ -44,13 +44,13 @@ def test_folds_join_two_branches(found):
     ends = [point for branch in found.branches for point in branch.points if point.kind == "fold"]
     assert len(ends) == 2 * len(fold.gamma)
     for end in ends:
-        assert end.gamma == pytest.approx(fold.gamma[0], rel=1e-11)
+        assert end.value == pytest.approx(fold.gamma[0], rel=1e-11)
         assert end.r_f == pytest.approx(fold.r_f[0], rel=1e-6)
 
 
 def test_words(found):
     assert [repr(branch) for branch in found.branches if branch.name == "1 inner"] == [
-        "Branch '1 inner': gamma 0.466173 (fold) stable 0.665408 (krein) flutter 0.695781 (krein) stable 0.8 (range)"
+        "Branch '1 inner': 0.466173 (fold) stable 0.665408 (krein) flutter 0.695781 (krein) stable 0.8 (range)"
     ]
 
 

@@ -156,8 +156,8 @@ def test_the_margin_counts_from_the_near_end(capsys, tmp_path):
 
 
 def test_jumps_not_made_out_are_no_margin(capsys, monkeypatch):
-    def incomplete(answer, slopes=None):
-        return replace(margins_of(answer, slopes), complete=False)
+    def incomplete(*arguments):
+        return replace(margins_of(*arguments), complete=False)
 
     monkeypatch.setattr("towatlas.commands.scene.margins_of", incomplete)
     code, out, err = run(capsys, *ASK, "--margin", "1%")

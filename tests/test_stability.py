@@ -363,25 +363,6 @@ def test_a_side_force_turns_with_the_turn():
     np.testing.assert_allclose(little.growth, none.growth, rtol=1e-6)
 
 
-class TestScene:
-    def test_growth_in_seconds_is_that_of_the_system(self, capsys):
-        code, out, _ = run(capsys, "scene", "skop-fig3", "--stability", "--asked=nodes", "--json")
-        assert code == 0
-        answer = json.loads(out)
-        scene, groups = towatlas.read_scene("skop-fig3"), answer["groups"]
-        rate = np.sqrt(scene.gravity / scene.radius)
-        fluid = {name: groups[name] for name in ("C", "m_f", "C_f", "w") if groups[name] is not None}
-        fluid = {} if answer["model"] == "vacuum" else fluid
-        found = towatlas.stability(groups["lam"], groups["w_f"], groups["gamma"], **fluid)
-        assert [row["branch"] for row in answer["stability"]] == list(found.equilibria.branch)
-        for k, row in enumerate(answer["stability"]):
-            assert row["kind"] == found.kind[k]
-            assert row["growth_1_s"] == pytest.approx(found.growth[k] * rate, rel=1e-6, abs=1e-9)
-            assert row["frequency_Hz"] == pytest.approx(found.frequency[k] * rate / (2 * np.pi), rel=1e-6)
-        code, out, _ = run(capsys, "scene", "skop-fig3", "--stability", "--asked=nodes")
-        assert "which shapes last:" in out
-
-
 class TestCommand:
     def test_table_and_json(self, capsys):
         code, out, err = run(capsys, "stability", "--lam=37.8", "--wf=1352", "--gamma=5.94", "--C=0.018", "--json")

@@ -18,7 +18,7 @@ from towatlas.tables.file import default_path
 
 OK, FAILED, USAGE, OUTSIDE, NO_STATE, FILE, LIMIT = 0, 1, 2, 3, 4, 5, 6
 # Of what --json prints; raised when a key changes its name or its meaning, or goes.
-JSON_SCHEMA = 4
+JSON_SCHEMA = 5
 
 
 def number(text: str) -> float:

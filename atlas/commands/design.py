@@ -7,7 +7,9 @@ from typing import Any
 from towatlas.commands import design_range
 from towatlas.commands.common import FAILED, NO_STATE, OK, add_patience, print_json, real, say
 from towatlas.commands.common import speed as dimensionless_speed
-from towatlas.commands.scene import describe_speed, quantity, scene_of
+from towatlas.commands.quantities import quantity
+from towatlas.commands.scene import describe_speed, scene_of
+from towatlas.commands.scene_stability import verdict_object
 from towatlas.scene.designs import LOOKED, UNITS, Cable, Design, design
 from towatlas.scene.ranges import POINTS
 from towatlas.scene.scene import MODELS
@@ -58,6 +60,7 @@ def add(commands: Any) -> None:
         metavar="TOL",
         help="of a range of speeds: only lengths that keep what is wanted within so much of it, as 5m or 10%%",
     )
+    parser.add_argument("--stable-only", action="store_true", help="only shapes that are known to last")
     parser.add_argument("--json", action="store_true", help="one object instead of a table")
     add_patience(parser)
     parser.set_defaults(run=_run)
@@ -72,7 +75,7 @@ def _run(options: argparse.Namespace) -> int:
         if getattr(options, name) is not None:
             raise ValueError(f"--{name} is for a range of speeds, as --speed 3kn:5kn")
     scene = scene_of(options.scene, options)
-    found = design(scene, **limits, model=options.model)
+    found = design(scene, **limits, model=options.model, stable_only=options.stable_only)
     rows = [_row(found, cable) for cable in found.chosen]
     reason = None if rows else _reason(found, options)
     if options.json:
@@ -85,6 +88,7 @@ def _run(options: argparse.Namespace) -> int:
             f"{found.quantity}_{UNITS[found.quantity]}": found.value,
             "max_radius_m": real(options.max_radius),
             "max_tension_N": real(options.max_tension),
+            "stable_only": options.stable_only,
             "longest_searched_m": found.longest,
             "complete": found.complete,
             "cables": rows,
@@ -120,6 +124,7 @@ def _row(found: Design, cable: Cable) -> dict[str, Any]:
         "r_f_m": cable.radius,
         "phase_deg": cable.phase_deg,
         "tension_N": cable.tension,
+        "stability": None if cable.verdict is None else verdict_object(cable.verdict),
         "jumps_looked_at": [abs(scene.gamma) * share for share in LOOKED],
         "jumps_complete": cable.jumps.complete,
         "nearest_gamma": None,
@@ -152,6 +157,10 @@ def _reason(found: Design, options: argparse.Namespace) -> str:
     )
     if found.cables:
         limits = options.max_radius, options.max_tension
+        within = [cable for cable in found.cables if cable.radius <= limits[0] and cable.tension <= limits[1]]
+        if within:
+            kinds = ", ".join(sorted({cable.verdict.kind for cable in within if cable.verdict is not None}))
+            return f"none of the {len(within)} cables {wanted} within the limits is known to last: {kinds}"
         nearest = min(found.cables, key=lambda cable: max(cable.radius / limits[0], cable.tension / limits[1]))
         return (
             f"none of the {len(found.cables)} cables {wanted} is within the limits: nearest comes one of "
@@ -174,7 +183,7 @@ def _text(found: Design, rows: list[dict[str, Any]]) -> str:
         f"nearest jump: between {LOOKED[0]:g} and {LOOKED[1]:g} times the speed, its speed less the scene's",
         "",
         f"{'length m':>13} {'nodes':>5} {'fish x m':>11} {'y m':>11} {'depth m':>11} {'tension N':>11} {'shape':>7} "
-        f"{'jump %':>8} {'m/s':>9} {'shapes':>8}",
+        f"{'jump %':>8} {'m/s':>9} {'shapes':>8}  lasts",
     ]
     for row in rows:
         cells = (
@@ -186,7 +195,8 @@ def _text(found: Design, rows: list[dict[str, Any]]) -> str:
         else:
             shapes = f"{row['nearest_shapes_below']} to {row['nearest_shapes_above']}"
             jump = f" {100 * row['distance_relative']:>+8.2f} {row['distance_m_s']:>+9.4g} {shapes:>8}"
-        lines.append(cells + jump + ("  expected" if row["expected"] else ""))
+        kind = row["stability"]["kind"]
+        lines.append(f"{cells}{jump}  {kind}{'  expected' if row['expected'] else ''}")
     return "\n".join(lines)
 
 

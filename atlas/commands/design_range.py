@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 
 from towatlas.commands.common import FAILED, NO_STATE, OK, print_json, real, say
-from towatlas.commands.scene import quantity, scene_of
+from towatlas.commands.quantities import quantity
+from towatlas.commands.scene import scene_of
+from towatlas.commands.scene_stability import verdict_object
 from towatlas.scene.designs import UNITS
 from towatlas.scene.ranges import POINTS, KeptCable, RangeDesign, design_over
 from towatlas.scene.scene import KNOT
@@ -51,7 +53,7 @@ def run(options: argparse.Namespace, limits: dict[str, Any]) -> int:
     points = POINTS if options.points is None else options.points
     wanted = next(name for name in UNITS if limits[name] is not None)
     allowed = None if options.within is None else tolerance(options.within, wanted, limits[wanted])
-    found = design_over(scene, low, high, points=points, model=options.model, **limits)
+    found = design_over(scene, low, high, points=points, model=options.model, stable_only=options.stable_only, **limits)
     kept = [
         cable
         for cable in found.cables
@@ -75,6 +77,11 @@ def run(options: argparse.Namespace, limits: dict[str, Any]) -> int:
 
 def _reason(found: RangeDesign, allowed: float | None) -> str:
     unit = UNITS[found.quantity]
+    if not found.cables and any(cable.expected for one in found.designs for cable in one.chosen):
+        return (
+            f"no cable up to {_longest(found):.4g} m that does at one of the {len(found.speeds)} speeds is known to "
+            "last over the range in the shape expected"
+        )
     if not found.cables:
         return (
             f"no cable up to {_longest(found):.4g} m has a {found.quantity} of {found.value:.6g} {unit} in the shape "
@@ -115,6 +122,7 @@ def _object(found: RangeDesign, kept: list[KeptCable], allowed: float | None, re
                         "z_f_m": float(cable.position[2]),
                         "r_f_m": cable.radius,
                         "tension_N": cable.tension,
+                        "stability": None if cable.verdict is None else verdict_object(cable.verdict),
                     }
                     for cable in one.chosen
                 ],
@@ -136,6 +144,7 @@ def _object(found: RangeDesign, kept: list[KeptCable], allowed: float | None, re
                     for speed, other in zip(cable.jumps, cable.other_beyond, strict=True)
                 ],
                 "jumps_complete": cable.complete,
+                "kinds": list(cable.kinds) or None,
             }
             for cable in kept
         ],

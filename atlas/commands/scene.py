@@ -12,16 +12,20 @@ from towatlas.commands import scene_margins as margins
 from towatlas.commands import scene_stability as verdicts
 from towatlas.commands.common import add_atlas, add_patience, print_json, real, say
 from towatlas.commands.common import speed as dimensionless_speed
+from towatlas.commands.quantities import Range, quantity, range_of
 from towatlas.commands.scene_files import check_out, write_scene
+from towatlas.commands.scene_seen import as_object, lines_of
 from towatlas.kernels import status
 from towatlas.scene.choice import Choice, percent
+from towatlas.scene.diagrams import SceneDiagram, scene_diagram
 from towatlas.scene.file import read_scene, scene_of_text, shipped_scenes
 from towatlas.scene.jumps import LOOKED, NEAR, Jumps, SceneAnswer, answer_scene
 from towatlas.scene.library import LARGEST
 from towatlas.scene.margins import margins_of
-from towatlas.scene.models import QUESTIONS, check_questions
+from towatlas.scene.models import QUESTIONS, check_questions, with_drag
 from towatlas.scene.scene import KNOT, MODELS, Scene
 from towatlas.scene.sensitivities import sensitivities_of
+from towatlas.scene.verdicts import verdicts_of
 from towatlas.tables.atlas import Atlas, open_atlas
 
 MEDIA = {"vacuum": "a vacuum", "air": "a nondense fluid", "water": "a dense fluid"}
@@ -45,7 +49,7 @@ def add(commands: Any) -> None:
         help="critical speeds and shapes of a towing scene in real units",
         description="Dimensionless groups, critical speeds and equilibria of a scene, a TOML file in real units, by "
         "the least model whose answers are those of the larger ones within the scene's tolerance. "
-        "It ends with the largest tension, and the nearest jumps with what they cost. "
+        "It ends with which shapes last, the largest tension, and the nearest jumps with what they cost. "
         f"Scenes that come with the package, by name: {', '.join(shipped_scenes())}.",
     )
     parser.add_argument("file", metavar="FILE", help="a scene, - for one on standard input; see docs/scenes.md")
@@ -71,7 +75,10 @@ def add(commands: Any) -> None:
         "--sensitivities", action="store_true", help="also how jumps, depth and tensions move with each key"
     )
     parser.add_argument(
-        "--stability", action="store_true", help="also which shapes last, with growth times and frequencies"
+        "--seen",
+        type=range_of("m/s"),
+        metavar="LOW:HIGH",
+        help="also what is seen as the speed rises from LOW to HIGH, as 1kn:8kn, and falls back; takes longer",
     )
     add_atlas(parser)
     where = parser.add_mutually_exclusive_group()
@@ -92,27 +99,6 @@ def _questions(text: str) -> tuple[str, ...]:
         return check_questions([name.strip() for name in text.split(",") if name.strip()])
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def quantity(unit: str, bare: str | None = None) -> Any:
-    """The type of an argument with a unit, positive; a bare number is SI, or in the unit named."""
-
-    def positive(text: str) -> float:
-        from towatlas.scene.units import parse_quantity
-
-        try:
-            value: float | str = float(text)
-        except ValueError:
-            value = text
-        try:
-            number = parse_quantity("value", value, unit, bare)
-        except ValueError as error:
-            raise argparse.ArgumentTypeError(str(error).removeprefix("value = ")) from None
-        if number <= 0.0:
-            raise argparse.ArgumentTypeError(f"{text} is not positive")
-        return number
-
-    return positive
 
 
 def add_speed(parser: argparse.ArgumentParser, rate: Any = dimensionless_speed) -> None:
@@ -147,15 +133,16 @@ def _run(options: argparse.Namespace) -> int:
     atlas = atlas_if_any(options.atlas)
     answer = answer_scene(scene, atlas, options.model, options.asked, options.compare)
     slopes = sensitivities_of(answer) if options.sensitivities else None
-    found = margins_of(answer, slopes)
-    motion = verdicts.stability_of_scene(answer) if options.stability else None
-    ending = margins.lines_of(found, answer)
-    if motion is not None:
-        ending = [*verdicts.lines_of(motion, answer), "", *ending]
+    found = margins_of(answer, slopes, 0.0 if asked is None else asked / scene.speed)
+    lasting = verdicts_of(answer)
+    history = _history(answer, options.seen) if options.seen else None
+    known = lines_of(history) if history else [_how_to_ask(scene)]
+    ending = [*verdicts.lines_of(lasting, answer), *known, "", *margins.lines_of(found, answer)]
     if options.out:
         write_scene(answer, options.out, ending, options.compare)
     elif options.json:
-        print_json(object_of(answer) | margins.as_object(found, asked, slopes) | verdicts.as_object(motion, answer))
+        parts = margins.as_object(found, asked, slopes) | verdicts.as_object(lasting, answer)
+        print_json(object_of(answer) | parts | {"seen": as_object(history) if history else None})
     else:
         table = [*margins.slope_lines(slopes), ""] if slopes else []
         print("\n".join([text_of(answer, options.compare), "", *table, *ending]))
@@ -165,6 +152,17 @@ def _run(options: argparse.Namespace) -> int:
     for code in codes - {status.OK}:
         say(f"a critical speed could not be had: {status.SENTENCES[code]}")
     return margins.judge(found, answer.choice.model, asked)
+
+
+def _history(answer: SceneAnswer, over: Range) -> SceneDiagram:
+    """Every branch over a range of speed, by the model that answers, or in a fluid the least with drag."""
+    scene, choice = answer.scene, answer.choice
+    model = choice.model if choice.forced else with_drag(scene, choice.model)
+    return scene_diagram(scene, speed=(over.low, over.high), model=model, unit=over.unit, size=over.size)
+
+
+def _how_to_ask(scene: Scene) -> str:
+    return f"what is seen as the speed rises and falls: --seen {0.5 * scene.speed:.2g}:{2.0 * scene.speed:.2g} (m/s)"
 
 
 def speeds(scene: Scene, gamma: float) -> dict[str, float | None]:

@@ -5,6 +5,7 @@ import math
 from typing import Any
 
 from towatlas.commands.common import FAILED, LIMIT, OK, real, say
+from towatlas.scene.edges import FlutterEdges
 from towatlas.scene.jumps import LOOKED, SceneAnswer
 from towatlas.scene.keys import KEYS
 from towatlas.scene.margins import Cost, Hanging, Margins, NearestJump
@@ -76,6 +77,14 @@ def judge(found: Margins, model: str, asked: float | None) -> int:
         unknown = ", whose interval is not known" if math.isnan(jump.distance_deviation) else ""
         say(f"within the margin of {asked:.4g} m/s: the jump {jump.side}, {_speed(found.scene, jump.speed)}{unknown}")
         code = LIMIT
+    for edge in found.edges_within(asked):
+        unknown = ", whose interval is not known" if found.scene.deviations else ""
+        text = f"an edge of flutter {'above' if edge.distance > 0.0 else 'below'}, {_speed(found.scene, edge.speed)}"
+        say(f"within the margin of {asked:.4g} m/s: {text}{unknown}")
+        code = LIMIT
+    if code == OK and found.flutter is not None and not found.flutter.complete:
+        say(f"that no edge of flutter is within the margin is not known: {found.flutter.failure or 'shapes were lost'}")
+        return FAILED
     if code == OK and not found.complete:
         say("jumps were not everywhere made out: that none lies within the margin is not known")
         return FAILED
@@ -98,8 +107,39 @@ def as_object(found: Margins, asked: float | None, known: Sensitivities | None) 
         "breaking_ratio": real(found.breaking_ratio),
         "nearest_jumps": {jump.side: _jump_object(jump) for jump in found.jumps} if found.jumps else None,
         "margin_m_s": asked,
-        "margin_kept": None if asked is None else not found.within(asked) and (found.complete or None),
+        "flutter_edges": None if found.flutter is None else _edges_object(found.flutter),
+        "margin_kept": None if asked is None else _kept(found, asked),
         "sensitivities": None if known is None else _slopes(known),
+    }
+
+
+def _kept(found: Margins, asked: float) -> bool | None:
+    """Whether no jump and no edge of flutter is within a margin; None where not known."""
+    if found.within(asked) or found.edges_within(asked):
+        return False
+    return (found.complete and (found.flutter is None or found.flutter.complete)) or None
+
+
+def _edges_object(found: FlutterEdges) -> dict[str, Any]:
+    sides = {"below": found.below, "above": found.above}
+    return {
+        "model": found.model,
+        **{
+            side: None
+            if edge is None
+            else {
+                "speed_m_s": edge.speed,
+                "speed_kn": edge.speed / KNOT,
+                "distance_relative": edge.distance,
+                "flutters_beyond": edge.enters,
+                "frequency_Hz": real(edge.frequency),
+            }
+            for side, edge in sides.items()
+        },
+        "followed_from_m_s": real(found.low),
+        "followed_to_m_s": real(found.high),
+        "complete": found.complete,
+        "failure": found.failure or None,
     }
 
 
@@ -200,10 +240,27 @@ def lines_of(found: Margins, answer: SceneAnswer) -> list[str]:
         ratio = f", {100 * found.breaking_ratio:.3g} % of cable.breaking_strength" if found.breaking_ratio > 0.0 else ""
         pull = _amount(found.largest_tension, "N", units, spread.get("largest_tension", 0.0))
         lines.append(f"largest tension along the cable: {pull} {place}{ratio}")
+    if found.flutter is not None:
+        lines.append(_edge_line(found.flutter, scene))
     lines += [_jump_line(jump, found, answer.choice.model, units) for jump in found.jumps]
     if not found.complete:
         lines.append("jumps were not everywhere made out: others may lie between")
     return lines
+
+
+def _edge_line(found: FlutterEdges, scene: Scene) -> str:
+    start = f"edges of flutter of the expected shape ({found.model} model):"
+    if math.isnan(found.low):
+        return f"{start} not known: {found.failure}"
+    parts = []
+    for side, edge, end in (("below", found.below, found.low), ("above", found.above, found.high)):
+        if edge is None:
+            parts.append(f"none {'down' if side == 'below' else 'up'} to {end:.4g} m/s")
+            continue
+        verb = "begins to flutter" if edge.enters else "ceases to flutter"
+        where = f"{_speed(scene, edge.speed)} ({_percent(edge.distance)})"
+        parts.append(f"{side} {where}, where it {verb}, at {edge.frequency:.3g} Hz")
+    return f"{start} {'; '.join(parts)}{f'; not certain: {found.failure}' if found.failure else ''}"
 
 
 def _jump_line(jump: NearestJump, found: Margins, model: str, units: dict[str, tuple[float, str]]) -> str:

@@ -1,67 +1,44 @@
-"""Which shapes of a scene last: the lines and the keys that `towatlas scene --stability` adds."""
+"""Which shapes of a scene last, for people and as JSON."""
 
-import math
 from typing import Any
 
 from towatlas.commands.common import real
 from towatlas.kernels import status
-from towatlas.results_motion import Stability
 from towatlas.scene.jumps import SceneAnswer
-
-WORDS = {
-    "stable": "stable",
-    "divergence": "left without turning back",
-    "flutter": "flutters",
-    "weak": "grows weakly",
-    "unknown": "not counted",
-}
+from towatlas.scene.verdicts import Verdict, Verdicts
 
 
-def stability_of_scene(answer: SceneAnswer) -> Stability:
-    """Growth rates of the shapes of the model used."""
-    from towatlas.solve.stability import stability_of
-
-    return stability_of(answer.equilibria)
-
-
-def lines_of(found: Stability, answer: SceneAnswer) -> list[str]:
+def lines_of(found: Verdicts, answer: SceneAnswer) -> list[str]:
     """A line for each shape, in the order of the table."""
-    unit = _rate(answer)
-    lines = ["which shapes last:"]
-    for k, branch in enumerate(found.equilibria.branch):
-        text = f"  {branch}{', expected' if k == found.equilibria.expected else ''}: {WORDS[str(found.kind[k])]}"
-        growth, frequency = found.growth[k] * unit, found.frequency[k] * unit / (2.0 * math.pi)
-        if math.isfinite(growth):
-            turning = f" at {frequency:.4g} Hz" if frequency else ""
-            if growth:
-                text += f", e times {'larger' if growth > 0.0 else 'smaller'} in {1.0 / abs(growth):.4g} s{turning}"
-        if found.status[k] != status.OK:
-            text += f" ({found.sentence(k)})"
-        lines.append(text)
+    shapes, model = answer.equilibria, answer.choice.model
+    lines = [f"which shapes last ({model} model):"]
+    for k, (branch, verdict) in enumerate(zip(shapes.branch, found.shapes, strict=True)):
+        lines.append(f"  {branch}{', expected' if k == shapes.expected else ''}: {verdict.words}")
+    for larger, verdict in found.by_larger.items():
+        if verdict.kind != found.shapes[shapes.expected].kind:
+            lines.append(f"  but by the {larger} model the shape expected: {verdict.words}")
+    if model == "vacuum" and answer.scene.density and not found.by_larger:
+        lines.append("  nothing damps in the vacuum model: in the fluid others may last; --model names a larger one")
     return [*lines, f"  looked at: {found.looked_at.replace('eigenvalues', 'eigenvalues, over sqrt(g/R),')}"]
 
 
-def as_object(found: Stability | None, answer: SceneAnswer) -> dict[str, Any]:
-    """The key of the JSON of a scene: a list in the order of its equilibria, null where not asked for."""
-    if found is None:
-        return {"stability": None}
-    unit = _rate(answer)
-    rows = []
-    for k, branch in enumerate(found.equilibria.branch):
-        rows.append(
-            {
-                "branch": str(branch),
-                "kind": str(found.kind[k]),
-                "unstable": int(found.unstable[k]) if found.unstable[k] >= 0 else None,
-                "growth_1_s": real(found.growth[k] * unit),
-                "frequency_Hz": real(found.frequency[k] * unit / (2.0 * math.pi)),
-                "error_1_s": real(found.error[k] * unit),
-                "status": status.FLAG_MEANINGS.split()[int(found.status[k])],
-            }
-        )
-    return {"stability": rows}
+def as_object(found: Verdicts, answer: SceneAnswer) -> dict[str, Any]:
+    """Keys of the JSON of a scene: a list in the order of its equilibria, and the shape expected by larger models."""
+    rows = zip(answer.equilibria.branch, found.shapes, strict=True)
+    return {
+        "stability": [{"branch": str(branch)} | verdict_object(verdict) for branch, verdict in rows],
+        "stability_by_larger": {model: verdict_object(verdict) for model, verdict in found.by_larger.items()},
+    }
 
 
-def _rate(answer: SceneAnswer) -> float:
-    """sqrt(g/R) [1/s]."""
-    return math.sqrt(answer.scene.gravity / answer.scene.radius)
+def verdict_object(verdict: Verdict) -> dict[str, Any]:
+    """What becomes of one shape."""
+    return {
+        "kind": verdict.kind,
+        "unstable": verdict.unstable if verdict.unstable >= 0 else None,
+        "growth_1_s": real(verdict.growth),
+        "frequency_Hz": real(verdict.frequency),
+        "error_1_s": real(verdict.error),
+        "status": status.FLAG_MEANINGS.split()[verdict.code],
+        "reason": verdict.reason or None,
+    }

@@ -22,6 +22,7 @@ POINTS = 200
 # Ranges wider than this are spaced evenly in their logarithm.
 WIDE = 10.0
 UNITS = {"length": "m", "speed": "m/s"}
+RATES = {"growth_1_s": "growth", "frequency_Hz": "frequency"}
 
 
 def add(commands: Any) -> None:
@@ -45,6 +46,8 @@ def add(commands: Any) -> None:
     )
     parser.add_argument("--points", type=int, default=POINTS, metavar="N", help="values swept, default %(default)s")
     parser.add_argument("--model", choices=MODELS, help="this one; default: the least that holds along each curve")
+    parser.add_argument("--stability", action="store_true", help="also which shapes last; takes longer")
+    parser.add_argument("--stable-only", action="store_true", help="only the rows of shapes that are known to last")
     parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
     parser.add_argument("--out", type=Path, metavar="FILE", help="FILE.csv, .nc, .svg, .png or .pdf")
     add_patience(parser)
@@ -56,6 +59,8 @@ def _run(options: argparse.Namespace) -> int:
         raise ValueError(f"--out {options.out}: the ending must be one of {', '.join(FORMATS)}")
     if not 2 <= options.points <= MOST:
         raise ValueError(f"--points {options.points}: 2 or more, up to {MOST:,}")
+    if options.stable_only and options.out and options.out.suffix.lower() != ".csv":
+        raise ValueError("--stable-only leaves rows out of a table: --out FILE.csv, or none; a figure has all shapes")
     swept = [name for name in UNITS if ":" in (getattr(options, name) or "")]
     if len(swept) != 1:
         raise ValueError("exactly one of --length and --speed is swept, a range as --length 0.1R:10R")
@@ -63,7 +68,8 @@ def _run(options: argparse.Namespace) -> int:
     changes, labels = _members(options, name)
     scenes = [read_scene(options.scene, one) for one in changes]
     values = _range(f"--{name}", getattr(options, name), UNITS[name], scenes[0].radius, options.points)
-    found = sweep(scenes, **{name: values}, model=options.model)
+    motion = options.stability or options.stable_only
+    found = sweep(scenes, **{name: values}, model=options.model, stability=motion)
     found = found.assign_coords(member=("member", labels)) if any(labels) else found
     _write(found, name, scenes, options)
     for k, label in enumerate(labels):
@@ -120,6 +126,10 @@ def _write(found: "xarray.Dataset", name: str, scenes: list[Scene], options: arg
     kind = options.out.suffix.lower() if options.out else ".csv"
     if options.out is None or kind == ".csv":
         rows = _rows(found, name, scenes)
+        if options.stable_only:
+            rows = [row for row in rows if row["kind"] == "stable"]
+            if not rows:
+                raise ArithmeticError("no shape along the curve is known to last")
         if options.out is None and options.json:
             print_json(rows)
             return
@@ -167,6 +177,9 @@ def _rows(found: "xarray.Dataset", name: str, scenes: list[Scene]) -> list[dict[
                 row |= {field: real(columns[field][k, i, j]) for field in numbers}
                 row |= {"shapes": int(shapes[k, i]), "nodes": int(columns["nodes"][k, i, j])}
                 row |= {"branch": int(columns["branch"][k, i, j]), "expected": bool(columns["expected"][k, i, j])}
+                if "kind" in found:
+                    row |= {"kind": str(found.kind.values[k, i, j])}
+                    row |= {name_: real(found[of].values[k, i, j]) for name_, of in RATES.items()}
                 row["jump_below"] = float(below.max()) if len(below) else None
                 row["jump_above"] = float(above.min()) if len(above) else None
                 rows.append(row)

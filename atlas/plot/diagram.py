@@ -1,4 +1,4 @@
-"""The figure of a bifurcation diagram: branches over the speed, what lasts solid, and where that changes."""
+"""The figure of a bifurcation diagram: branches over speed or length, what lasts solid, and where that changes."""
 
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -7,16 +7,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-if TYPE_CHECKING:
-    from towatlas.results_motion import Branch, Diagram
+from towatlas.solve.seen import LASTING, landing
 
-# What is drawn, its axis, and whether that is logarithmic where it is wide.
+if TYPE_CHECKING:
+    from towatlas.results_motion import Diagram
+    from towatlas.scene.diagrams import SceneDiagram
+
+# What is drawn, the field of a branch, its axis without and with units, and whether it is logarithmic where it is wide.
 SHOWN = {
-    "x_f": ("position of the fish over tow radius, x_f", False),
-    "r_f": ("distance of the fish from the axis over tow radius", True),
-    "depth": ("depth of the fish over tow radius", False),
-    "tension": ("tension at the tow point over (mu + rho A) g R", True),
+    "x_f": ("x_f", "position of the fish over tow radius, x_f", "position of the fish away from the axis, m", False),
+    "r_f": ("r_f", "distance of the fish from the axis over tow radius", "distance of the fish from the axis, m", True),
+    "depth": ("z_f", "depth of the fish over tow radius", "depth of the fish below the tow point, m", False),
+    "tension": ("tension", "tension at the tow point over (mu + rho A) g R", "tension at the tow point, N", True),
 }
+VALUES = {"gamma": "speed gamma = Omega sqrt(R/g)", "lam": "length of the cable over tow radius, lambda"}
 STYLES: dict[str, dict[str, Any]] = {
     "stable": {"color": "#1f4e9c", "linewidth": 2.0, "linestyle": "-"},
     "weak": {"color": "#1f4e9c", "linewidth": 1.4, "linestyle": (0, (6, 1.5, 1, 1.5))},
@@ -38,61 +42,52 @@ WIDE = 30.0
 APART = 0.035
 
 
-def plot_diagram(found: "Diagram", axes: Axes, show: str = "r_f") -> list[Line2D]:
-    """Branches over the speed; solid where they last, with folds and the edges of flutter, and where a jump goes.
+def plot_diagram(found: "Diagram | SceneDiagram", axes: Axes, show: str = "r_f") -> list[Line2D]:
+    """Branches over speed or length; solid where they last, with folds and edges of flutter, and where a jump goes.
 
     Parameters
     ----------
-    found : Diagram
-        From `towatlas.diagram`.
+    found : Diagram or SceneDiagram
+        From `towatlas.diagram` or `towatlas.scene.diagrams.scene_diagram`.
     axes : Axes
         To draw on.
     show : {"x_f", "r_f", "depth", "tension"}
-        Over the speed.
+        What is drawn.
 
     Returns
     -------
     list of Line2D
         The stretches of the branches.
     """
-    field = {"depth": "z_f"}.get(show, show)
-    title, logarithmic = SHOWN[show]
+    unit, size = getattr(found, "unit", ""), getattr(found, "size", 1.0)
+    field, plain, named, logarithmic = SHOWN[show]
     lines, kinds, marks = [], set(), {}
     every = np.concatenate([getattr(branch, field) for branch in found.branches])
     for branch in found.branches:
-        values = getattr(branch, field)
+        heights = getattr(branch, field)
         for (low, high), kind in zip(pairwise(branch.points), branch.between, strict=True):
-            inside = (branch.gamma > low.gamma) & (branch.gamma < high.gamma)
-            speeds = [low.gamma, *branch.gamma[inside], high.gamma]
-            heights = [getattr(low, field), *values[inside], getattr(high, field)]
-            lines += axes.plot(speeds, heights, **STYLES[kind])
+            inside = (branch.value > low.value) & (branch.value < high.value)
+            values = np.array([low.value, *branch.value[inside], high.value]) / size
+            lines += axes.plot(values, [getattr(low, field), *heights[inside], getattr(high, field)], **STYLES[kind])
             kinds.add(kind)
         for point in branch.points:
             if point.kind in MARKERS:
-                marks[point.gamma, getattr(point, field)] = point.kind
-    axes.set_xlim(found.low, found.high)
+                marks[point.value / size, getattr(point, field)] = point.kind
+    axes.set_xlim(found.low / size, found.high / size)
     if logarithmic and every.min() > 0.0 and every.max() > WIDE * every.min():
         axes.set_yscale("log")
     if show == "depth":
         axes.invert_yaxis()
-    for (gamma, value), kind in marks.items():
-        axes.plot(
-            gamma,
-            value,
-            MARKERS[kind][0],
-            color="white",
-            markeredgecolor="0.15",
-            markersize=4.5,
-            zorder=5,
-            clip_on=False,
-        )
-    for gamma, start, end in _jumps(found, field):
-        axes.annotate(
-            "", (gamma, end), (gamma, start), arrowprops={"arrowstyle": "-|>", "color": "#a61e3c", "linewidth": 1.2}
-        )
-    _write_speeds(axes, sorted({gamma for gamma, _ in marks}))
-    axes.set_xlabel("speed gamma = Omega sqrt(R/g)")
-    axes.set_ylabel(title)
+    for (value, height), kind in marks.items():
+        axes.plot(value, height, MARKERS[kind][0], **MARK, zorder=5, clip_on=False)
+    jumps = _jumps(found, field)
+    for value, start, end in jumps:
+        arrow = {"arrowstyle": "-|>", "color": "#a61e3c", "linewidth": 1.2}
+        axes.annotate("", (value / size, end), (value / size, start), arrowprops=arrow)
+    _write_values(axes, sorted({value for value, _ in marks}))
+    moved = found.moved
+    axes.set_xlabel(VALUES.get(moved, f"{moved}, {unit}"))
+    axes.set_ylabel(plain if moved in VALUES else named)
     axes.grid(color="0.92", linewidth=0.6)
     handles = [Line2D([], [], **STYLES[kind], label=LABELS[kind]) for kind in STYLES if kind in kinds]
     handles += [
@@ -100,45 +95,34 @@ def plot_diagram(found: "Diagram", axes: Axes, show: str = "r_f") -> list[Line2D
         for kind, (mark, text) in MARKERS.items()
         if kind in marks.values()
     ]
-    if list(_jumps(found, field)):
+    if jumps:
         handles.append(Line2D([], [], color="#a61e3c", marker=">", markersize=4, label="where a jump may go"))
     axes.figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False, fontsize=8)
     return lines
 
 
-def _jumps(found: "Diagram", field: str) -> list[tuple[float, float, float]]:
-    """Folds at which a shape that lasts ends: the speed, there, and the nearest shape that lasts."""
+def _jumps(found: "Diagram | SceneDiagram", field: str) -> list[tuple[float, float, float]]:
+    """Folds at which a shape that lasts ends: the value, there, and where a cable may land."""
     jumps = []
-    for branch in found.branches:
+    for k, branch in enumerate(found.branches):
         for end, kind in ((0, branch.between[0]), (-1, branch.between[-1])):
             point = branch.points[end]
-            if point.kind != "fold" or kind not in ("stable", "weak"):
+            if point.kind != "fold" or kind not in LASTING:
                 continue
-            others = [_there(other, point.gamma) for other in found.branches if other is not branch]
-            places = [place for place in others if place is not None]
-            if not places:
-                continue
-            start = point.r_f
-            target, k = min(places, key=lambda place: abs(np.log(float(place[0].r_f[place[1]]) / start)))
-            jumps.append((point.gamma, getattr(point, field), float(getattr(target, field)[k])))
+            if (to := landing(found.branches, k, point.value)) >= 0:
+                target = found.branches[to]
+                height = float(np.interp(point.value, target.value, getattr(target, field)))
+                jumps.append((point.value, getattr(point, field), height))
     return jumps
 
 
-def _there(branch: "Branch", gamma: float) -> "tuple[Branch, int] | None":
-    """The sample of a branch at a speed, if it lasts there."""
-    if not branch.points[0].gamma < gamma < branch.points[-1].gamma:
-        return None
-    k = int(np.argmin(np.abs(branch.gamma - gamma)))
-    return (branch, k) if branch.kind[k] in ("stable", "weak") else None
-
-
-def _write_speeds(axes: Axes, speeds: list[float]) -> None:
-    """Speeds of folds and edges along the top, those that have room."""
+def _write_values(axes: Axes, values: list[float]) -> None:
+    """Where folds and edges are along the top, those that have room."""
     low, high = axes.get_xlim()
     kept: list[float] = []
-    for speed in speeds:
-        if not kept or speed - kept[-1] > APART * (high - low):
-            kept.append(speed)
+    for value in values:
+        if not kept or value - kept[-1] > APART * (high - low):
+            kept.append(value)
     top = axes.secondary_xaxis("top")
-    top.set_xticks(kept, [f"{speed:.4g}" for speed in kept], rotation=90, fontsize=7)
+    top.set_xticks(kept, [f"{value:.4g}" for value in kept], rotation=90, fontsize=7)
     top.tick_params(length=2)

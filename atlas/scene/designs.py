@@ -13,6 +13,7 @@ from towatlas.scene.angles import Angles, angles_along, extrapolation
 from towatlas.scene.choice import least_model
 from towatlas.scene.models import solvable_models, system_of
 from towatlas.scene.scene import MODELS, Scene, check_model, patient_with
+from towatlas.scene.verdicts import Verdict, verdict_of, verdict_with_drag
 from towatlas.solve.depths import cables_to_depth
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.folds import folds_in_speed
@@ -61,6 +62,10 @@ class Cable:
         Between LOOKED times the speed, dimensionless; where they come from is not found out.
     angles : Angles or None
         Between cable and stream; None where it is not said where the cable was measured.
+    equilibria : Equilibria
+        All shapes of this cable, dimensionless.
+    verdict : Verdict or None
+        Whether the shape lasts; in a fluid by a model with drag unless another was named. None within the computation.
     """
 
     length: float
@@ -74,6 +79,8 @@ class Cable:
     tension: float
     jumps: Folds
     angles: Angles | None
+    equilibria: Equilibria
+    verdict: Verdict | None
 
     @property
     def radius(self) -> float:
@@ -163,6 +170,7 @@ def design(
     max_tension: float = np.inf,
     max_length: float | None = None,
     model: str | None = None,
+    stable_only: bool = False,
 ) -> Design:
     """Cable lengths that bring the fish to a depth, a radius or a tension; the length of the scene is not used.
 
@@ -185,6 +193,8 @@ def design(
     model : str, optional
         "vacuum", "air" or "water"; by default the least whose answers about each expected cable are those of the larger
         ones.
+    stable_only : bool
+        Whether only shapes that last are chosen.
 
     Returns
     -------
@@ -224,8 +234,20 @@ def design(
     unit = UNITS[quantity]
     with patient_with(scene, f"--{quantity} {value:g} {unit}, --max-length {longest:g} m", longest / scene.radius):
         found = _by_least(scene, names, quantity, value, longest)
+        found = replace(found, cables=tuple(_judged(found, cable, model) for cable in found.cables))
     chosen = [cable for cable in found.cables if cable.radius <= max_radius and cable.tension <= max_tension]
+    if stable_only:
+        chosen = [cable for cable in chosen if cable.verdict is not None and cable.verdict.kind == "stable"]
     return replace(found, chosen=tuple(chosen), forced=len(names) == 1)
+
+
+def _judged(found: Design, cable: Cable, named: str | None) -> Cable:
+    """The cable with its verdict."""
+    check_patience("growth rates of cables", REMEDY)
+    scene = with_length(found.scene, cable.length)
+    shapes = cable.equilibria
+    of = verdict_of(scene, shapes, cable.shape) if named else verdict_with_drag(scene, found.model, shapes, cable.shape)
+    return replace(cable, verdict=of)
 
 
 def _by_least(scene: Scene, names: Sequence[str], quantity: str, value: float, longest: float) -> Design:
@@ -302,6 +324,8 @@ def _by_model(scene: Scene, model: str, quantity: str, value: float, longest: fl
                 tension=float(shapes.tension[at]) * scene.force_unit(model),
                 jumps=folds_in_speed(system, gamma * LOOKED[0], gamma * LOOKED[1], named=False),
                 angles=angles_along(scene, shapes, at),
+                equilibria=shapes,
+                verdict=None,
             )
         )
     return Design(

@@ -7,6 +7,7 @@ from math import isnan, nan
 import numpy as np
 
 from towatlas.results import Equilibria, Folds
+from towatlas.scene.edges import FlutterEdge, FlutterEdges, flutter_edges
 from towatlas.scene.jumps import LOOKED, SceneAnswer
 from towatlas.scene.scene import Scene, patient_with
 from towatlas.scene.sensitivities import Sensitivities, sensitivities_of
@@ -134,6 +135,8 @@ class Margins:
         Why they are not known; else empty.
     idle : tuple of str
         Uncertain keys that have no part in the model used.
+    flutter : FlutterEdges or None
+        Edges of flutter of the shape expected, which count as jumps; None where jumps were not asked for.
     """
 
     scene: Scene
@@ -144,6 +147,7 @@ class Margins:
     deviations: dict[str, float]
     failure: str
     idle: tuple[str, ...]
+    flutter: FlutterEdges | None
 
     @property
     def breaking_ratio(self) -> float:
@@ -175,8 +179,23 @@ class Margins:
             if jump.exists and not abs(jump.speed - speed) - jump.distance_deviation > distance
         ]
 
+    def edges_within(self, distance: float) -> list[FlutterEdge]:
+        """Edges of flutter nearer to the speed of the scene than a distance; their intervals are not known.
 
-def margins_of(answer: SceneAnswer, known: Sensitivities | None = None) -> Margins:
+        Parameters
+        ----------
+        distance : float
+            [m/s], > 0.
+
+        Returns
+        -------
+        list of FlutterEdge
+        """
+        edges = () if self.flutter is None else (self.flutter.below, self.flutter.above)
+        return [edge for edge in edges if edge is not None and not abs(edge.speed - self.scene.speed) > distance]
+
+
+def margins_of(answer: SceneAnswer, known: Sensitivities | None = None, reach: float = 0.0) -> Margins:
     """How far the answer for a scene is from trouble.
 
     Parameters
@@ -185,6 +204,8 @@ def margins_of(answer: SceneAnswer, known: Sensitivities | None = None) -> Margi
         From `towatlas.answer_scene`.
     known : Sensitivities, optional
         Of it; they are computed where a key is uncertain.
+    reach : float
+        As of `towatlas.scene.edges.flutter_edges`.
 
     Returns
     -------
@@ -227,6 +248,7 @@ def margins_of(answer: SceneAnswer, known: Sensitivities | None = None) -> Margi
         if (folds := answer.folds) is not None:
             sides = zip(("below", "above"), folds.beside(scene.gamma), strict=True)
             jumps = tuple(_jump(answer, folds, side, k, known) for side, k in sides)
+        flutter = flutter_edges(answer, reach) if jumps else None
     return Margins(
         scene=scene,
         jumps=jumps,
@@ -236,6 +258,7 @@ def margins_of(answer: SceneAnswer, known: Sensitivities | None = None) -> Margi
         deviations=_deviations(scene, known) if scene.deviations else {},
         failure=failure,
         idle=() if known is None else tuple(known.idle),
+        flutter=flutter,
     )
 
 

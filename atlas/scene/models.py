@@ -97,6 +97,23 @@ def solvable_models(scene: Scene) -> tuple[list[str], list[str]]:
     return known, [model for model in MODELS if model not in known]
 
 
+def with_drag(scene: Scene, model: str) -> str:
+    """The model, or in a fluid the least with drag: what lasts where nothing damps may not last there.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : str
+        One of MODELS.
+
+    Returns
+    -------
+    str
+    """
+    known = solvable_models(scene)[0]
+    return known[1] if model == "vacuum" and len(known) > 1 else model
+
+
 def system_of(scene: Scene, model: str) -> System:
     """The groups of a scene by a model, as what is solved.
 

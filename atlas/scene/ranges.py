@@ -1,7 +1,7 @@
 """Cables for a range of speeds: the lengths that do at each, and what one length kept does over all of it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from towatlas.effort import check_patience
 from towatlas.scene.designs import Design, design, with_length
-from towatlas.scene.models import system_of
+from towatlas.scene.models import system_of, with_drag
 from towatlas.scene.scene import MODELS, Scene, check_model, patient_with
+from towatlas.scene.verdicts import verdict_of
+from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.shots import REMEDY
 from towatlas.solve.sweeps import Swept, sweep_shapes
 
@@ -46,6 +48,9 @@ class KeptCable:
         Whether another shape is expected beyond each.
     complete : bool
         Whether all jumps were made out.
+    kinds : tuple of str
+        What becomes of the shape expected at the speeds looked at, as of `towatlas.results_motion.Stability`; empty
+        where it was not asked for.
     """
 
     length: float
@@ -55,6 +60,7 @@ class KeptCable:
     jumps: Array
     other_beyond: NDArray[np.bool_]
     complete: bool
+    kinds: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -100,7 +106,14 @@ class RangeDesign:
 
 
 def design_over(
-    scene: Scene, low: float, high: float, *, points: int = POINTS, model: str | None = None, **wanted: Any
+    scene: Scene,
+    low: float,
+    high: float,
+    *,
+    points: int = POINTS,
+    model: str | None = None,
+    stable_only: bool = False,
+    **wanted: Any,
 ) -> RangeDesign:
     """Cable lengths that bring the fish to a depth, a radius or a tension at speeds of a range, and how each keeps it.
 
@@ -114,6 +127,8 @@ def design_over(
         At how many speeds, evenly spaced, lengths are found, 2 to 50.
     model : str, optional
         "vacuum", "air" or "water"; by default the least that holds at both ends and in the middle.
+    stable_only : bool
+        Whether only lengths are kept whose shape expected lasts at all 33 speeds.
     **wanted
         What `towatlas.design` takes: one of depth, radius and tension, limits, and max_length.
 
@@ -145,7 +160,7 @@ def design_over(
         raise ValueError(f"points must be 2 to {MOST}, got {points}")
     if model is not None:
         check_model(model)
-    speeds = np.linspace(low, high, points)
+    speeds, free = np.linspace(low, high, points), model is None
     scenes = [scene.at(speed=float(speed)) for speed in speeds]
     with patient_with(scenes[-1]):
         found: dict[int, Design] = {}
@@ -160,6 +175,9 @@ def design_over(
         quantity, value = designs[0].quantity, designs[0].value
         keep = _Keeper(scene, model, quantity, value, (low, high))
         cables = keep.all(designs, speeds)
+        if stable_only:
+            judged = [keep.judged(cable, with_drag(scene, model) if free else model) for cable in cables]
+            cables = [cable for cable in judged if set(cable.kinds) == {"stable"}]
     return RangeDesign(scene, quantity, value, speeds, model, tuple(designs), tuple(cables))
 
 
@@ -204,6 +222,16 @@ class _Keeper:
     def _uneven(self, cable: KeptCable) -> float:
         """How far the middle of a span is from the value wanted."""
         return 0.5 * sum(cable.spans[self.quantity]) - self.value
+
+    def judged(self, cable: KeptCable, model: str) -> KeptCable:
+        """The same with what becomes of the shape expected at the speeds looked at."""
+        kinds = []
+        for speed in np.linspace(*self.ends, SAMPLES):
+            check_patience("growth rates over the range of speeds", REMEDY)
+            scene = with_length(self.scene.at(speed=float(speed)), cable.length)
+            shapes = solve_equilibria(system_of(scene, model), scene.gamma)
+            kinds.append(verdict_of(scene, shapes, shapes.expected).kind)
+        return replace(cable, kinds=tuple(kinds))
 
     def kept(self, length: float, speeds: tuple[float, ...]) -> KeptCable:
         """One length over the range."""

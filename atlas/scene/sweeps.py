@@ -1,6 +1,7 @@
 """Curves of a scene over its length or its speed, one for each of several scenes: all shapes, branches and jumps."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,8 +11,10 @@ from towatlas.checks import check_real
 from towatlas.effort import check_patience, patience
 from towatlas.scene.choice import least_model
 from towatlas.scene.designs import DESIGN_QUESTIONS, with_length
-from towatlas.scene.models import system_of
+from towatlas.scene.models import system_of, with_drag
 from towatlas.scene.scene import MODELS, Scene, check_model, patient_with
+from towatlas.scene.verdicts import rate_unit
+from towatlas.solve.growth import Spectrum
 from towatlas.solve.shots import REMEDY
 from towatlas.solve.sweeps import Swept, sweep_shapes
 
@@ -35,6 +38,12 @@ FIELDS = {
     "branch": ("1", "the same number along one branch, until a fold ends it"),
     "expected": ("1", "whether the shape is the one to be expected"),
 }
+# With stability.
+MOTION = {
+    "kind": ("1", "whether the shape lasts"),
+    "growth": ("1/s", "growth of the leading eigenvalue"),
+    "frequency": ("Hz", "frequency of the leading eigenvalue"),
+}
 MOST = 10**5
 
 
@@ -44,6 +53,7 @@ def sweep(
     length: ArrayLike | None = None,
     speed: ArrayLike | None = None,
     model: str | None = None,
+    stability: bool = False,
 ) -> "xarray.Dataset":
     """All shapes of a scene at many lengths of its cable, or at many speeds.
 
@@ -54,7 +64,11 @@ def sweep(
     length, speed : array_like
         Lengths [m], or speeds of the tow point [m/s], > 0; exactly one of them, two or more values.
     model : str, optional
-        "vacuum", "air" or "water"; by default the least that holds at both ends and in the middle of each curve.
+        "vacuum", "air" or "water"; by default the least that holds at both ends and in the middle of each curve, with
+        stability in a fluid one with drag.
+    stability : bool
+        Whether each shape has its kind, as of `towatlas.results_motion.Stability`, growth [1/s] and frequency [Hz];
+        some hundredths of a second a shape.
 
     Returns
     -------
@@ -103,11 +117,12 @@ def sweep(
         swept = []
         for k, member in enumerate(members):
             check_patience("curves", REMEDY, done=k, of=len(members))
-            swept.append(_curve(member, name, values, model))
-    return _dataset(members, name, values, swept)
+            swept.append(_curve(member, name, values, model, stability))
+        motion = [_motion(member, swept[k][1], name) for k, member in enumerate(members)] if stability else None
+    return _dataset(members, name, values, swept, motion)
 
 
-def _curve(scene: Scene, name: str, values: Array, model: str | None) -> tuple[str, Swept]:
+def _curve(scene: Scene, name: str, values: Array, model: str | None, stability: bool) -> tuple[str, Swept]:
     if name == "speed" and not np.isfinite(scene.length):
         raise ValueError(f"{scene.source}: cable.length is missing")
     scenes = [_at(scene, name, float(value)) for value in (values[0], values[len(values) // 2], values[-1])]
@@ -115,6 +130,7 @@ def _curve(scene: Scene, name: str, values: Array, model: str | None) -> tuple[s
         if model is None:
             chosen = [least_model(one, None, DESIGN_QUESTIONS).model for one in scenes]
             model = max(chosen, key=MODELS.index)
+            model = with_drag(scene, model) if stability else model
         system = system_of(scenes[0], model)
         if name == "length":
             return model, sweep_shapes(system, scene.gamma, "lam", values / scene.radius)
@@ -125,15 +141,41 @@ def _at(scene: Scene, name: str, value: float) -> Scene:
     return with_length(scene, value) if name == "length" else scene.at(speed=value)
 
 
-def _dataset(members: list[Scene], name: str, values: Array, curves: list[tuple[str, Swept]]) -> "xarray.Dataset":
+def _motion(scene: Scene, swept: Swept, name: str) -> dict[str, NDArray[Any]]:
+    """Kind, growth and frequency of each shape."""
+    spectra, unit = [], rate_unit(scene)
+    for i, row in enumerate(swept.row):
+        check_patience("growth rates along the curve", REMEDY, done=i, of=len(swept.row))
+        value, r_f = float(swept.values[row]), float(swept.columns["r_f"][i])
+        system = replace(swept.system, lam=value) if name == "length" else swept.system
+        gamma = float(np.copysign(value, swept.gamma)) if name == "speed" else swept.gamma
+        spectra.append(Spectrum(system, gamma, r_f))
+    speeds = swept.values[swept.row] if name == "speed" else abs(swept.gamma)
+    leading = np.array([one.roots.sigma[0] if len(one.roots) else np.nan for one in spectra], np.complex128)
+    rates = leading * speeds * unit
+    return {
+        "kind": np.array([one.kind for one in spectra], np.str_),
+        "growth": rates.real,
+        "frequency": rates.imag / (2.0 * np.pi),
+    }
+
+
+def _dataset(
+    members: list[Scene],
+    name: str,
+    values: Array,
+    curves: list[tuple[str, Swept]],
+    motion: list[dict[str, NDArray[Any]]] | None,
+) -> "xarray.Dataset":
     import xarray
 
     count = len(values)
     most = max(int(np.bincount(swept.row, minlength=count).max()) for _, swept in curves)
     jumps = max((len(swept.folds) for _, swept in curves), default=0)
-    kinds = {"nodes": -1, "branch": -1, "expected": False}
+    missing: dict[str, Any] = {"nodes": -1, "branch": -1, "expected": False, "kind": np.array("", "U10")}
+    fields = FIELDS | MOTION if motion else FIELDS
     data: dict[str, NDArray[Any]] = {
-        field: np.full((len(members), count, most), kinds.get(field, np.nan)) for field in FIELDS
+        field: np.full((len(members), count, most), missing.get(field, np.nan)) for field in fields
     }
     shapes, jump = np.zeros((len(members), count), np.int64), np.full((len(members), jumps), np.nan)
     change = np.zeros((len(members), jumps), np.int64)
@@ -143,12 +185,13 @@ def _dataset(members: list[Scene], name: str, values: Array, curves: list[tuple[
         shapes[k] = counts
         jump[k, : len(swept.folds)] = swept.folds * (values[0] / swept.values[0])
         change[k, : len(swept.folds)] = swept.changes
-        for field, column in _fields(scene, model, name, values, swept).items():
+        columns = _fields(scene, model, name, values, swept) | (motion[k] if motion else {})
+        for field, column in columns.items():
             data[field][k, swept.row, place] = column
     other = "speed" if name == "length" else "length"
     fixed = [getattr(scene, other) for scene in members]
     units = {"length": "m", "speed": "m/s"}
-    about = {field: {"units": unit, "long_name": text} for field, (unit, text) in FIELDS.items()}
+    about = {field: {"units": unit, "long_name": text} for field, (unit, text) in fields.items()}
     return xarray.Dataset(
         {field: (("member", "value", "shape"), column, about[field]) for field, column in data.items()}
         | {

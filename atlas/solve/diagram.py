@@ -1,4 +1,4 @@
-"""Bifurcation diagrams: all branches of shapes of one cable over its speed, with what lasts and where that changes."""
+"""Bifurcation diagrams: all branches of shapes of one cable over its speed or its length, and what of them lasts."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -62,7 +62,7 @@ def diagram(
     Examples
     --------
     >>> diagram(10, 1, (0.3, 0.6)).branches[0]
-    Branch 'outward': gamma 0.3 (range) stable 0.6 (range)
+    Branch 'outward': 0.3 (range) stable 0.6 (range)
     """
     low, high = (check_speed(speed) for speed in gamma)
     if not 0.0 < low < high:
@@ -71,54 +71,60 @@ def diagram(
         return diagram_of(System.of(lam, w_f, C=C, m_f=m_f, C_f=C_f, w=w, C_t=C_t, C_s=C_s, b_s=b_s), low, high)
 
 
-def diagram_of(system: System, low: float, high: float) -> Diagram:
-    """As `diagram`, of a system already checked.
+def diagram_of(system: System, low: float, high: float, *, gamma: float | None = None) -> Diagram:
+    """As `diagram`, of a system already checked, or over the length of its cable.
 
     Parameters
     ----------
     system : System
     low, high : float
-        Speeds [-], 0 < low < high.
+        Speeds [-], 0 < low < high; lengths, where a speed is given.
+    gamma : float, optional
+        The speed, > 0, where it is the length that moves [-].
 
     Returns
     -------
     Diagram
     """
-    traced, follower = followed(system, low, high)
+    traced, follower = followed(system, low, high, gamma=gamma)
     branches, counted = [], True
     for samples, began, ended in follower.branches(traced):
         counted &= all(sample.spectrum.status == status.OK for sample in samples)
         modes = follower.modes(samples, began, ended)
         branches.append(_branch(follower, samples, modes, began, ended))
-    order = sorted(branches, key=lambda branch: (branch.gamma[0], -branch.r_f[-1]))
-    certain = traced.certain and counted
-    return Diagram(system, low, high, tuple(order), certain, looked_at(low, high, traced.certain, counted))
+    order = sorted(branches, key=lambda branch: (branch.value[0], -branch.r_f[-1]))
+    certain, moved = traced.certain and counted, follower.path.moved[0]
+    about = looked_at(low, high, traced.certain, counted, moved)
+    return Diagram(system, moved, low, high, tuple(order), certain, about)
 
 
 def _branch(
     follower: Follower, samples: list[Sample], modes: list[Mode], began: Fold | None, ended: Fold | None
 ) -> Branch:
-    speeds = np.array([follower.speed(sample.t) for sample in samples])
-    columns = _columns(follower, np.array([sample.x for sample in samples]), speeds)
+    t = np.array([sample.t for sample in samples])
+    values, speeds = (np.array([of(one) for one in t]) for of in (follower.value, follower.speed))
+    columns = _columns(follower, np.array([sample.x for sample in samples]), t)
     leading = np.array([sample.spectrum.roots.sigma[0] if len(sample.spectrum.roots) else np.nan for sample in samples])
     kinds = np.array([sample.spectrum.kind for sample in samples], np.str_)
 
-    def point(kind: str, gamma: float, fold: Fold | None = None) -> Point:
+    def point(kind: str, at: float, fold: Fold | None = None) -> Point:
         if fold is None:
-            values = {name: float(np.interp(gamma, speeds, columns[name])) for name in SHOWN}
+            heights = {name: float(np.interp(at, t, columns[name])) for name in SHOWN}
         else:
-            found = _columns(follower, np.array([fold.x]), np.array([gamma]))
-            values = {name: float(found[name][0]) for name in SHOWN}
-        return Point(kind, gamma, **values)
+            found = _columns(follower, np.array([fold.x]), np.array([at]))
+            heights = {name: float(found[name][0]) for name in SHOWN}
+        return Point(kind, follower.value(at), **heights)
 
-    ends = []
-    for fold, sample in ((began, samples[0]), (ended, samples[-1])):
-        ends.append(point("range" if fold is None else "fold", follower.speed((fold or sample).t), fold))
+    ends = [
+        point("range" if fold is None else "fold", (fold or sample).t, fold)
+        for fold, sample in ((began, samples[0]), (ended, samples[-1]))
+    ]
     edges = {(edge.kind, edge.t) for mode in modes for edge in (mode.start, mode.end)}
-    inner = [point(kind, follower.speed(t)) for kind, t in edges if kind in ("hopf", "krein", "unknown")]
-    points = [ends[0], *sorted(inner, key=lambda one: one.gamma), ends[1]]
+    inner = [point(kind, at) for kind, at in edges if kind in ("hopf", "krein", "unknown")]
+    points = [ends[0], *sorted(inner, key=lambda one: one.value), ends[1]]
     return Branch(
         name=follower.name(samples[-1]),
+        value=values,
         gamma=speeds,
         nodes=columns["nodes"],
         **{name: columns[name] for name in SHOWN},
@@ -127,22 +133,28 @@ def _branch(
         unstable=np.array([sample.spectrum.unstable for sample in samples]),
         kind=kinds,
         points=tuple(points),
-        between=tuple(_between(speeds, kinds, points)),
+        between=tuple(_between(values, kinds, points)),
     )
 
 
-def _columns(follower: Follower, x: Array, speeds: Array) -> dict[str, Any]:
-    rows = np.tile(follower.system.row(), (len(x), 1))
+def _columns(follower: Follower, x: Array, t: Array) -> dict[str, Any]:
+    rows, speeds = follower.path.at(t)
     return quantities(np.arange(len(x)), x, rows, speeds)
 
 
-def _between(speeds: Array, kinds: NDArray[np.str_], points: list[Point]) -> list[str]:
-    """The kind that most samples have between each point and the next, the nearest where there is none."""
+def _between(values: Array, kinds: NDArray[np.str_], points: list[Point]) -> list[str]:
+    """The kind that most samples have between each point and the next, the nearest where there is none.
+
+    What flutters somewhere in a stretch of weak growth is a window of flutter, and what is not everywhere known to last
+    is not said to."""
     found = []
     for low, high in pairwise(points):
-        inside = kinds[(speeds >= low.gamma) & (speeds <= high.gamma)]
+        inside = kinds[(values >= low.value) & (values <= high.value)]
         if not len(inside):
-            inside = kinds[[int(np.argmin(np.abs(speeds - 0.5 * (low.gamma + high.gamma))))]]
+            inside = kinds[[int(np.argmin(np.abs(values - 0.5 * (low.value + high.value))))]]
         names, counts = np.unique(inside, return_counts=True)
-        found.append(str(names[np.argmax(counts)]))
+        kind = str(names[np.argmax(counts)])
+        if kind == "weak" and "flutter" in names:
+            kind = "flutter"
+        found.append("unknown" if kind in ("stable", "weak") and "unknown" in names else kind)
     return found

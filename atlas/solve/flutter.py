@@ -96,21 +96,25 @@ def flutter_of(system: System, low: float, high: float) -> Flutter:
     )
 
 
-def looked_at(low: float, high: float, certain: bool, counted: bool) -> str:
+def looked_at(low: float, high: float, certain: bool, counted: bool, moved: str = "gamma") -> str:
     """What was looked at, in words.
 
     Parameters
     ----------
     low, high : float
-        Speeds [-].
+        Of what moves.
     certain, counted : bool
         Whether all shapes were made out, and what grows was counted.
+    moved : str
+        Its name.
 
     Returns
     -------
     str
     """
-    text = f"gamma {low:.6g} to {high:.6g}, at speeds {100 * SPACING:g} % apart at most: narrower windows may be missed"
+    text = (
+        f"{moved} {low:.6g} to {high:.6g}, at values {100 * SPACING:g} % apart at most: narrower windows may be missed"
+    )
     if not certain:
         text += "; not all shapes were made out"
     return text if counted else text + "; some shapes were not counted, and end their windows"

@@ -1,22 +1,23 @@
-"""The modes of motion of shapes, followed along every branch from speed to speed, and where they begin to grow."""
+"""The modes of motion of shapes, followed along every branch as speed or length moves, and where they begin to grow."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from towatlas.effort import check_patience
+from towatlas.effort import TooMuchWork, check_patience
 from towatlas.kernels import status
+from towatlas.kernels.system import LAM
 from towatlas.numerics.rows import EPS
 from towatlas.results_motion import Window
 from towatlas.solve.growth import WEAK, Spectrum, has_drag, reach_of
-from towatlas.solve.motion import Complex, motions
+from towatlas.solve.motion import Complex, Motion, motions
 from towatlas.solve.paths import Fold, Path, Trace, trace
 from towatlas.solve.spectrum import CLOSE, polish, together
 from towatlas.system import System
 
-# Speeds looked at are no further apart than this part of them.
+# Speeds, or lengths, looked at are no further apart than this part of them.
 SPACING = 0.01
 # Halvings of a step across an edge by counts, then rounds of secants on what is zero there.
 HALVINGS, ROUNDS = 12, 40
@@ -25,13 +26,13 @@ SETTLED = 1e-13
 # Circle around two modes that meet without drag, and how far a mode may move from one sample to the next, in units of
 # Omega.
 CIRCLE, FAR = 0.05, 0.2
-REMEDY = "a narrower range of speeds, or a shorter cable, has fewer shapes to look at"
+REMEDY = "a narrower range, a lower speed or a shorter cable has fewer shapes to look at"
 
 
 @dataclass(frozen=True)
 class Sample:
-    """A shape of one branch: the logarithm t of its speed over the lowest, that of the radius of its fish over
-    g / Omega^2, its nodes, its number from the axis outwards, and how it moves."""
+    """A shape of one branch: the logarithm t of its speed, or length, over the lowest, that of the radius of its fish
+    over g / Omega^2, its nodes, its number from the axis outwards, and how it moves."""
 
     t: float
     x: float
@@ -59,59 +60,99 @@ class Mode:
     sigma: list[complex]
 
 
-def followed(system: System, low: float, high: float) -> "tuple[Trace, Follower]":
-    """All shapes between two speeds, at speeds close enough for windows, and what follows their modes.
+def followed(
+    system: System, low: float, high: float, *, gamma: float | None = None, at: float | None = None
+) -> "tuple[Trace, Follower]":
+    """All shapes between two speeds, or two lengths, close enough for windows, and what follows their modes.
 
     Parameters
     ----------
     system : System
     low, high : float
-        Speeds [-], 0 < low < high.
+        Speeds [-], 0 < low < high; lengths, where a speed is given.
+    gamma : float, optional
+        The speed, > 0, where it is the length that moves [-].
+    at : float, optional
+        A value between them to be among those that are looked at.
 
     Returns
     -------
     Trace
     Follower
     """
-    path, end = Path(system.row(), low, ("gamma",)), float(np.log(high / low))
+    if gamma is None:
+        path = Path(system.row(), low, ("gamma",))
+    else:
+        path = Path(replace(system, lam=low).row(), gamma, ("lam",))
+    end = float(np.log(high / low))
     count = int(np.ceil(end / np.log1p(SPACING))) + 1
-    traced = trace(path, 0.0, end, at=np.linspace(0.0, end, max(2, count)))
+    values = np.linspace(0.0, end, max(2, count))
+    traced = trace(path, 0.0, end, at=values if at is None else np.union1d(values, np.log(at / low)))
     return traced, Follower(system, path)
 
 
 class Follower:
-    """Follows the modes of the shapes of one system from speed to speed."""
+    """Follows the modes of the shapes of one system from speed to speed, or from length to length."""
 
     def __init__(self, system: System, path: Path):
         self.system, self.path = system, path
         self.drag = has_drag(system)
 
     def speed(self, t: float) -> float:
-        return float(self.path.gamma * np.exp(t))
+        return float(self.path.gamma * np.exp(t)) if self.path.by_speed else self.path.gamma
+
+    def value(self, t: float) -> float:
+        """Of what moves."""
+        return self.speed(t) if self.path.by_speed else self.system_at(t).lam
+
+    def system_at(self, t: float) -> System:
+        if self.path.by_speed:
+            return self.system
+        return replace(self.system, lam=float(self.path.row[LAM] * np.exp(t)))
+
+    def motion(self, t: float, x: float, reach: float) -> Motion:
+        speed = self.speed(t)
+        row = self.system_at(t).row()[None]
+        return motions(np.array([np.exp(x) / speed**2]), np.array([speed]), row, reach)[0]
 
     def branches(self, traced: Trace) -> Iterator[tuple[list[Sample], Fold | None, Fold | None]]:
         """Samples of each branch, and the folds that begin and end it."""
-        labels, columns = traced.branches(), traced.columns
-        found: dict[int, list[tuple[int, int]]] = {}
-        for i, column in enumerate(labels):
-            for k, label in enumerate(column):
-                found.setdefault(int(label), []).append((i, k))
-        total, done = sum(len(places) for places in found.values()), 0
-        for places in found.values():
+        found = _places(traced)
+        total, done = sum(len(places) for places in found), 0
+        for places in found:
             samples = []
             for i, k in places:
                 check_patience("growth rates along the branches", REMEDY, done=done, of=total)
-                samples.append(self.sample(columns[i].t, float(columns[i].x[k]), k))
+                samples.append(self.sample(traced.columns[i].t, float(traced.columns[i].x[k]), k))
                 done += 1
-            first, last = places[0][0], places[-1][0]
-            before = traced.folds[first - 1] if first > 0 else None
-            after = traced.folds[last] if last < len(columns) - 1 else None
-            yield samples, before, after
+            yield samples, *_folds(traced, places)
+
+    def through(self, traced: Trace, t: float, x: float) -> tuple[list[Sample], Fold | None, Fold | None]:
+        """The same of the branch that passes a shape, from it outwards as far as the time allows; else samples end."""
+        columns = traced.columns
+        i = int(np.argmin([abs(column.t - t) for column in columns]))
+        k = int(np.argmin(np.abs(columns[i].x - x)))
+        places = next(places for places in _places(traced) if (i, k) in places)
+        order = sorted(range(len(places)), key=lambda j: abs(columns[places[j][0]].t - t))
+        samples: dict[int, Sample] = {}
+        for j in order:
+            try:
+                check_patience("growth rates along the branch", REMEDY, done=len(samples), of=len(places))
+                at, place = places[j]
+                samples[j] = self.sample(columns[at].t, float(columns[at].x[place]), place)
+            except TooMuchWork:
+                if not samples:
+                    raise
+                break
+        found = [samples[j] for j in sorted(samples)]
+        began, ended = _folds(traced, places)
+        return found, began if 0 in samples else None, ended if len(places) - 1 in samples else None
 
     def sample(self, t: float, x: float, place: int) -> Sample:
         ends = self.path.shots(np.array([x]), np.array([t]), self.path.jets(1))
         nodes = int(np.floor(ends.angle[0] / np.pi + 0.5))
-        return Sample(t, x, nodes, place, Spectrum(self.system, self.speed(t), float(np.exp(x) / self.speed(t) ** 2)))
+        r_f = float(np.exp(x) / self.speed(t) ** 2)
+        return Sample(t, x, nodes, place, Spectrum(self.system_at(t), self.speed(t), r_f))
 
     def between(self, a: Sample, b: Sample, t: float) -> Sample:
         """The shape of the branch of two samples at a speed between them."""
@@ -186,10 +227,8 @@ class Follower:
 
     def mode(self, a: Sample, b: Sample, t: float, guess: complex) -> complex:
         """The growth rate next to a guess, of the shape between two samples."""
-        speed = self.speed(t)
-        r_f = np.array([np.exp(self.offset(a, b, t)) / speed**2])
-        reach = max(reach_of(self.system, speed), 1.1 * abs(guess))
-        motion = motions(r_f, np.array([speed]), self.system.row()[None], reach)[0]
+        reach = max(reach_of(self.system_at(t), self.speed(t)), 1.1 * abs(guess))
+        motion = self.motion(t, self.offset(a, b, t), reach)
         roots, found = polish(motion, np.array([guess]), np.array([guess]))
         if found[0] and abs(roots.sigma[0] - guess) < CLOSE:
             return complex(roots.sigma[0])
@@ -219,9 +258,7 @@ class Follower:
         return sample.t, centre.imag
 
     def _height(self, sample: Sample, centre: complex) -> float:
-        speed = self.speed(sample.t)
-        r_f = np.array([np.exp(sample.x) / speed**2])
-        motion = motions(r_f, np.array([speed]), self.system.row()[None], 1.0 + abs(centre))[0]
+        motion = self.motion(sample.t, sample.x, 1.0 + abs(centre))
         near = together(motion, centre, CIRCLE).sigma
         if len(near) < 2:
             raise _LostError
@@ -296,6 +333,22 @@ class Follower:
         if sample.nodes == 0:
             return "outward"
         return f"{sample.nodes} {'outer' if sample.spectrum.index % 2 else 'inner'}"
+
+
+def _places(traced: Trace) -> list[list[tuple[int, int]]]:
+    """Of each branch the columns in which it is, and where."""
+    found: dict[int, list[tuple[int, int]]] = {}
+    for i, column in enumerate(traced.branches()):
+        for k, label in enumerate(column):
+            found.setdefault(int(label), []).append((i, k))
+    return list(found.values())
+
+
+def _folds(traced: Trace, places: list[tuple[int, int]]) -> tuple[Fold | None, Fold | None]:
+    """Those in which a branch begins and ends."""
+    first, last = places[0][0], places[-1][0]
+    before = traced.folds[first - 1] if first > 0 else None
+    return before, traced.folds[last] if last < len(traced.folds) else None
 
 
 class _LostError(ArithmeticError):

@@ -97,8 +97,7 @@ def stability_of(found: Equilibria) -> Stability:
     >>> [str(kind) for kind in stability_of(equilibria(2.5, 0.0, 2.534)).kind]
     ['divergence', 'flutter', 'stable']
     """
-    count, system = len(found), found.system
-    speed = abs(found.gamma)
+    count, speed = len(found), abs(found.gamma)
     growth, frequency, error = (np.full(count, np.nan) for _ in range(3))
     unstable, index = np.full(count, -1), np.full(count, -1)
     codes = np.full(count, status.OK, np.int8)
@@ -106,8 +105,7 @@ def stability_of(found: Equilibria) -> Stability:
     with patience():
         for k in range(count):
             check_patience("growth rates of the shapes", REMEDY, done=k, of=count)
-            energy = index_of(str(found.branch[k])) if system.in_vacuum else -1
-            answer = Spectrum(system, found.gamma, float(found.r_f[k]), energy)
+            answer = spectrum_of(found, k)
             codes[k], index[k] = answer.status, answer.index
             roots = answer.roots
             kinds[k] = answer.kind
@@ -127,11 +125,43 @@ def stability_of(found: Equilibria) -> Stability:
         error,
         codes,
         tuple(sigmas),
-        _looked_at(found),
+        looked_at(found),
     )
 
 
-def _looked_at(found: Equilibria) -> str:
+def spectrum_of(found: Equilibria, k: int) -> Spectrum:
+    """Growth rates of one of some equilibria.
+
+    Parameters
+    ----------
+    found : Equilibria
+    k : int
+        Which.
+
+    Returns
+    -------
+    Spectrum
+
+    Raises
+    ------
+    TooMuchWork
+        As `stability_of`.
+    """
+    energy = index_of(str(found.branch[k])) if found.system.in_vacuum else -1
+    return Spectrum(found.system, found.gamma, float(found.r_f[k]), energy)
+
+
+def looked_at(found: Equilibria) -> str:
+    """Which growth rates are looked for, in words.
+
+    Parameters
+    ----------
+    found : Equilibria
+
+    Returns
+    -------
+    str
+    """
     if not has_drag(found.system):
         return "all growth rates: none is larger than gamma, and their number is that of the energy"
     reach = reach_of(found.system, found.gamma) * abs(found.gamma)

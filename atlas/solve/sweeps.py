@@ -20,6 +20,9 @@ class Swept:
 
     Attributes
     ----------
+    system : System
+    gamma : float
+        Speed [-]; where that moves, the lowest.
     values : ndarray, shape (values,)
         Of lam or gamma [-], rising.
     row : ndarray of int, shape (shapes,)
@@ -39,6 +42,8 @@ class Swept:
         Whether everything that was looked at was made out.
     """
 
+    system: System
+    gamma: float
     values: Array
     row: Integers
     branch: Integers
@@ -88,6 +93,8 @@ def sweep_shapes(system: System, gamma: float, name: str, values: Array) -> Swep
         [int(b - a) for a, b, fold in zip(shapes, shapes[1:], traced.folds, strict=False) if fold], np.int64
     )
     return Swept(
+        system=system,
+        gamma=gamma,
         values=values,
         row=rows,
         branch=np.concatenate([labels[k] for k in at]),
