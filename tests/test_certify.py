@@ -50,7 +50,8 @@ def chain_about(lam, w_f, n, bits=133, order=60) -> Chain:
     state = solve_critical(lam, w_f, n)
     gamma = float(state.gamma)
     with working_bits(bits + 64):
-        return find_chain(lam, w_f, n, abs(float(state.x_f)) * gamma**2, gamma, bits, order)[0]
+        a = abs(float(state.x_f)) * gamma**2
+        return find_chain(lam=lam, w_f=w_f, gamma=gamma, n=n, a=a, bits=bits, order=order)[0]
 
 
 @pytest.fixture(scope="module")
@@ -208,8 +209,8 @@ def test_no_transition_is_proved_up_to_the_threshold_itself(w_f, threshold):
     """Thresholds that are binary fractions: sqrt(1 + w_f^2) = 1 and 1.25."""
     for n in (1, 2, 40):
         lam = threshold + 2 * (n - 1)
-        assert no_transition(lam, w_f, n)
-        assert not no_transition(np.nextafter(lam, 99.0), w_f, n)
+        assert no_transition(lam=lam, w_f=w_f, n=n)
+        assert not no_transition(lam=np.nextafter(lam, 99.0), w_f=w_f, n=n)
     found = certify(threshold, w_f, 1)
     assert (found.status, found.gamma, found.n_proved, found.unique) == (NO_TRANSITION, None, True, None)
 

@@ -39,10 +39,8 @@ class Certificate:
     status : str
         CERTIFIED; NO_TRANSITION_PROVED: the cable is no longer than the threshold; WRAPPED: not proved, enclosures
         stayed too wide; NOT_ISOLATED: not proved, no such fold was found.
-    gamma, R_x0, x_f : str or None
-        Critical speed, radial force at the tow point, position of the fish [-].
-    gamma_radius, R_x0_radius, x_f_radius : str or None
-        What those are off by at most [-], > 0.
+    gamma, gamma_radius, R_x0, R_x0_radius, x_f, x_f_radius : str or None
+        Critical speed, radial force at the tow point, position of the fish [-], each with what it is off by at most.
     n_proved : bool
         Whether the fold is proved to be the n-th, or that there is none.
     unique : str or None
@@ -114,7 +112,7 @@ def certify(lam: float, w_f: float, n: int = 1, *, digits: int = 30) -> Certific
     count = check_real("digits", digits)
     if count.ndim or not (1 <= count <= MOST_DIGITS and count == int(count)):
         raise ValueError(f"digits must be a whole number from 1 to {MOST_DIGITS}, got {digits!r}")
-    if no_transition(lam, w_f, n):
+    if no_transition(lam=lam, w_f=w_f, n=n):
         reason = f"lambda <= {2 * n - 1} + sqrt(1 + w_f^2) - w_f, in exact arithmetic"
         return Certificate(lam, w_f, n, NO_TRANSITION, n_proved=True, reason=reason)
     with patience():
@@ -122,10 +120,11 @@ def certify(lam: float, w_f: float, n: int = 1, *, digits: int = 30) -> Certific
         if state.status != codes.OK:
             return Certificate(lam, w_f, n, NOT_ISOLATED, reason=codes.SENTENCES[int(state.status)])
         gamma = float(state.gamma)
-        return certify_about(lam, w_f, n, abs(float(state.x_f)) * gamma**2, gamma, int(digits))
+        a = abs(float(state.x_f)) * gamma**2
+        return certify_about(lam=lam, w_f=w_f, gamma=gamma, n=n, a=a, digits=int(digits))
 
 
-def no_transition(lam: float, w_f: float, n: int) -> bool:
+def no_transition(*, lam: float, w_f: float, n: int) -> bool:
     """Whether lambda <= 2 n - 1 + sqrt(1 + w_f^2) - w_f, exactly.
 
     Parameters
@@ -143,15 +142,16 @@ def no_transition(lam: float, w_f: float, n: int) -> bool:
     return beyond <= 0 or beyond**2 <= 1 + weight**2
 
 
-def certify_about(lam: float, w_f: float, n: int, a: float, gamma: float, digits: int) -> Certificate:
+def certify_about(*, lam: float, w_f: float, gamma: float, n: int, a: float, digits: int) -> Certificate:
     """The same about a fold known in floats; no checks.
 
     Parameters
     ----------
-    lam, w_f : float
+    lam, w_f, gamma : float
+        Cable length, fish weight, speed [-].
     n : int
-    a, gamma : float
-        Offset of the fish gamma^2 |x_f| and speed [-], > 0.
+    a : float
+        Offset of the fish gamma^2 |x_f| [-], > 0.
     digits : int
 
     Returns
@@ -164,7 +164,8 @@ def certify_about(lam: float, w_f: float, n: int, a: float, gamma: float, digits
         check_patience("proving a critical speed", "a longer cable (lam) is farther from its threshold")
         try:
             with working_bits(base + more + 64):
-                chain, floats = find_chain(lam, w_f, n, a, gamma, base + more, ORDER * base // BITS + terms)
+                bits, order = base + more, ORDER * base // BITS + terms
+                chain, floats = find_chain(lam=lam, w_f=w_f, gamma=gamma, n=n, a=a, bits=bits, order=order)
                 try:
                     proof = prove(chain)
                 except Refused:

@@ -60,16 +60,17 @@ class Floats:
 
 
 def find_chain(
-    lam: float, w_f: float, n: int, a: float, gamma: float, bits: int, order: int, fixed: bool = False
+    *, lam: float, w_f: float, gamma: float, n: int, a: float, bits: int, order: int, fixed: bool = False
 ) -> tuple[Chain, Floats]:
     """A chain about a fold known in floats.
 
     Parameters
     ----------
-    lam, w_f : float
+    lam, w_f, gamma : float
+        Cable length, fish weight, speed [-].
     n : int
-    a, gamma : float
-        Offset of the fish gamma^2 |x_f|, and speed.
+    a : float
+        Offset of the fish gamma^2 |x_f| [-], > 0.
     bits, order : int
         Of the coefficients of the steps, bits >= 120.
     fixed : bool

@@ -32,10 +32,8 @@ class CertifiedState:
     ----------
     branch : str
         Its pair, as "2 inner"; "outward" for the one without a pair.
-    R_x0, x_f : str
-        Radial force at the tow point, position of the fish [-].
-    R_x0_radius, x_f_radius : str
-        Radii [-], > 0.
+    R_x0, R_x0_radius, x_f, x_f_radius : str
+        Radial force at the tow point, position of the fish [-], each with its radius, > 0.
     """
 
     branch: str
@@ -117,10 +115,10 @@ def certify_equilibria(lam: float, w_f: float, gamma: float) -> CertifiedEquilib
         for branch, x_f in zip(found.branch, found.x_f, strict=True):
             check_patience("proving equilibria", "a lower speed (gamma) has fewer")
             try:
-                states.append(_state(lam, w_f, gamma, str(branch), float(x_f)))
+                states.append(_state(lam=lam, w_f=w_f, gamma=gamma, branch=str(branch), x_f=float(x_f)))
             except Refused as refused:
                 reasons.append((refused.status, f"{branch}: {refused}"))
-        passed, why = _passed(lam, w_f, gamma)
+        passed, why = _passed(lam=lam, w_f=w_f, gamma=gamma)
     if passed is None:
         reasons.append((NOT_ISOLATED, why))
     elif not reasons and len(states) != 1 + 2 * passed:
@@ -130,16 +128,15 @@ def certify_equilibria(lam: float, w_f: float, gamma: float) -> CertifiedEquilib
     return CertifiedEquilibria(lam, w_f, gamma, CERTIFIED, tuple(states), passed, f"all of them, by theorem: {why}")
 
 
-def _state(lam: float, w_f: float, gamma: float, branch: str, x_f: float) -> CertifiedState:
+def _state(*, lam: float, w_f: float, gamma: float, branch: str, x_f: float) -> CertifiedState:
     name = branch.split()
     n = int(name[0]) if len(name) == 2 else 0
     refusal = Refused(NOT_ISOLATED, "not tried")
     for more, terms in MORE:
         try:
             with working_bits(BITS + more + 64):
-                chain, floats = find_chain(
-                    lam, w_f, n, abs(x_f) * gamma**2, gamma, BITS + more, ORDER + terms, fixed=True
-                )
+                a, bits, order = abs(x_f) * gamma**2, BITS + more, ORDER + terms
+                chain, floats = find_chain(lam=lam, w_f=w_f, gamma=gamma, n=n, a=a, bits=bits, order=order, fixed=True)
                 try:
                     claim, steps = prove(chain)
                 except Refused:
@@ -148,18 +145,18 @@ def _state(lam: float, w_f: float, gamma: float, branch: str, x_f: float) -> Cer
                 index = zeros(chain, claim, steps)
                 if index != n - (name[-1] == "outer"):
                     raise Refused(NOT_ISOLATED, f"q has {index} zeros, which is another branch")
-                a, G = binary(*chain.a) + claim.unknowns[0] * arb(0, 1), arb(gamma) ** 2
-                if not a > 0:
+                offset, G = binary(*chain.a) + claim.unknowns[0] * arb(0, 1), arb(gamma) ** 2
+                if not offset > 0:
                     raise Refused(NOT_ISOLATED, "the offset of the fish is not proved to be positive")
                 u = end_hull(chain, claim)[1]
-                parts = (-chain.sign * u / G, chain.sign * a / G)
+                parts = (-chain.sign * u / G, chain.sign * offset / G)
                 return CertifiedState(branch, *(text for part in parts for text in decimal(part, DIGITS)))
         except Refused as refused:
             refusal = refused
     raise refusal
 
 
-def _passed(lam: float, w_f: float, gamma: float) -> tuple[int | None, str]:
+def _passed(*, lam: float, w_f: float, gamma: float) -> tuple[int | None, str]:
     """Number of critical speeds below gamma, proved, and what bounds it."""
     n = 1
     while True:
