@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from towatlas.solve.folds import folds
     from towatlas.solve.many import equilibria_many
     from towatlas.solve.shapes import shape, shape_of
+    from towatlas.solve.spectra import stability_many
     from towatlas.solve.stability import stability, stability_of
     from towatlas.system import System
     from towatlas.tables.atlas import Atlas, open_atlas
@@ -64,6 +65,7 @@ __all__ = [
     "solve_critical",
     "solve_drag_folds",
     "stability",
+    "stability_many",
     "stability_of",
     "sweep",
     "threshold_length",
@@ -88,6 +90,7 @@ _HOMES = {
     "solve.folds": ("folds",),
     "solve.many": ("equilibria_many",),
     "solve.shapes": ("shape", "shape_of"),
+    "solve.spectra": ("stability_many",),
     "solve.stability": ("stability", "stability_of"),
     "system": ("System",),
     "tables.atlas": ("Atlas", "open_atlas"),

@@ -11,6 +11,7 @@ from towatlas.results import Equilibria
 from towatlas.results_motion import Stability
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.growth import REMEDY, Spectrum, has_drag, reach_of
+from towatlas.solve.motion import motions
 from towatlas.system import System
 
 
@@ -103,10 +104,12 @@ def stability_of(found: Equilibria) -> Stability:
     codes = np.full(count, status.OK, np.int8)
     kinds, sigmas = ["unknown"] * count, [np.empty(0, np.complex128)] * count
     with patience():
+        reach = reach_of(system, found.gamma)
+        moved = motions(found.r_f, np.full(count, found.gamma), np.tile(system.row(), (count, 1)), reach)
         for k in range(count):
             check_patience("growth rates of the shapes", REMEDY, done=k, of=count)
             energy = index_of(str(found.branch[k])) if system.in_vacuum else -1
-            answer = Spectrum(system, found.gamma, float(found.r_f[k]), energy)
+            answer = Spectrum(system, found.gamma, float(found.r_f[k]), energy, moved[k])
             codes[k], index[k] = answer.status, answer.index
             roots = answer.roots
             kinds[k] = answer.kind
