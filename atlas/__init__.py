@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from towatlas.effort import TooMuchWork, patience
     from towatlas.limits import excess_length, massless_cable, threshold_length
     from towatlas.results import CriticalStates, Cusps, DragFolds, Equilibria, FishPositions, Folds
-    from towatlas.results_motion import Branch, Diagram, Flutter, Stability, Window
+    from towatlas.results_motion import Boundary, Branch, Diagram, Flutter, Stability, Window
     from towatlas.scene.designs import design
     from towatlas.scene.file import read_scene
     from towatlas.scene.jumps import answer_scene
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from towatlas.solve.drag_folds import solve_drag_folds
     from towatlas.solve.equilibria import equilibria
     from towatlas.solve.flutter import flutter
+    from towatlas.solve.flutter_boundaries import krein_boundaries
     from towatlas.solve.folds import folds
     from towatlas.solve.many import equilibria_many
     from towatlas.solve.shapes import shape, shape_of
@@ -34,6 +35,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Atlas",
     "AtlasFileError",
+    "Boundary",
     "Branch",
     "CriticalStates",
     "Cusps",
@@ -56,6 +58,7 @@ __all__ = [
     "excess_length",
     "flutter",
     "folds",
+    "krein_boundaries",
     "massless_cable",
     "open_atlas",
     "patience",
@@ -76,7 +79,7 @@ _HOMES = {
     "effort": ("TooMuchWork", "patience"),
     "limits": ("excess_length", "massless_cable", "threshold_length"),
     "results": ("CriticalStates", "Cusps", "DragFolds", "Equilibria", "FishPositions", "Folds"),
-    "results_motion": ("Branch", "Diagram", "Flutter", "Stability", "Window"),
+    "results_motion": ("Boundary", "Branch", "Diagram", "Flutter", "Stability", "Window"),
     "scene.designs": ("design",),
     "scene.file": ("read_scene",),
     "scene.jumps": ("answer_scene",),
@@ -87,6 +90,7 @@ _HOMES = {
     "solve.drag_folds": ("solve_drag_folds",),
     "solve.equilibria": ("equilibria",),
     "solve.flutter": ("flutter",),
+    "solve.flutter_boundaries": ("krein_boundaries",),
     "solve.folds": ("folds",),
     "solve.many": ("equilibria_many",),
     "solve.shapes": ("shape", "shape_of"),

@@ -84,7 +84,8 @@ def stability_many(
         shape = found.r_f.shape
         systems = np.stack([found[name].values.ravel() for name in COLUMNS], axis=1)
         flat = {name: found[name].values.reshape(-1, shape[-1]) for name in ("r_f", "nodes", "error")}
-        columns = _columns(systems, found.gamma.values.ravel(), **flat)
+        index = _indices(systems, flat["r_f"], flat["nodes"])
+        columns = growth_columns(systems, found.gamma.values.ravel(), index=index, **flat)
     variables: dict[str, Any] = {
         name: (found.r_f.dims, columns[name].reshape(shape), {"long_name": text, "units": "1"})
         for name, text in FIELDS.items()
@@ -97,8 +98,27 @@ def stability_many(
     return found.assign(variables).assign_attrs(title="Growth rates of small motions of towed cables")
 
 
-def _columns(systems: Array, gamma: Array, r_f: Array, nodes: Integers, error: Array) -> dict[str, NDArray[Any]]:
-    """FIELDS over (system, shape)."""
+def growth_columns(
+    systems: Array, gamma: Array, *, r_f: Array, nodes: Integers, index: Integers, error: Array
+) -> dict[str, NDArray[Any]]:
+    """Growth rates of shapes that are known, of systems of which neighbours follow each other.
+
+    Parameters
+    ----------
+    systems : ndarray, shape (systems, columns)
+        As of `System.row`.
+    gamma : ndarray, shape (systems,)
+        Speeds [-].
+    r_f, error : ndarray, shape (systems, shapes)
+        Distances of the fish from the axis, nan where there is no shape, and their relative errors [-].
+    nodes, index : ndarray of int, shape (systems, shapes)
+        As of `Stability`.
+
+    Returns
+    -------
+    dict of ndarray, shape (systems, shapes)
+        FIELDS.
+    """
     missing: dict[str, Any] = {
         "growth": np.nan,
         "frequency": np.nan,
@@ -109,7 +129,6 @@ def _columns(systems: Array, gamma: Array, r_f: Array, nodes: Integers, error: A
     out: dict[str, NDArray[Any]] = {name: np.full(r_f.shape, value) for name, value in missing.items()}
     out["kind"] = np.full(r_f.shape, "", "<U10")
     out["growth_status"] = np.full(r_f.shape, status.OK, np.int8)
-    index = _indices(systems, r_f, nodes)
     there = np.isfinite(r_f)
     with ThreadPoolExecutor(threads()) as pool:
         for begin in range(0, len(gamma), LINKS * CHAINS):
