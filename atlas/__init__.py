@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from towatlas.solve.flutter_boundaries import krein_boundaries
     from towatlas.solve.folds import folds
     from towatlas.solve.many import equilibria_many
+    from towatlas.solve.proof.certificates import Certificate, certify
+    from towatlas.solve.proof.states import CertifiedEquilibria, certify_equilibria
     from towatlas.solve.shapes import shape, shape_of
     from towatlas.solve.spectra import stability_many
     from towatlas.solve.stability import stability, stability_of
@@ -37,6 +39,8 @@ __all__ = [
     "AtlasFileError",
     "Boundary",
     "Branch",
+    "Certificate",
+    "CertifiedEquilibria",
     "CriticalStates",
     "Cusps",
     "Diagram",
@@ -50,6 +54,8 @@ __all__ = [
     "TooMuchWork",
     "Window",
     "answer_scene",
+    "certify",
+    "certify_equilibria",
     "cusps",
     "design",
     "diagram",
@@ -93,6 +99,8 @@ _HOMES = {
     "solve.flutter_boundaries": ("krein_boundaries",),
     "solve.folds": ("folds",),
     "solve.many": ("equilibria_many",),
+    "solve.proof.certificates": ("Certificate", "certify"),
+    "solve.proof.states": ("CertifiedEquilibria", "certify_equilibria"),
     "solve.shapes": ("shape", "shape_of"),
     "solve.spectra": ("stability_many",),
     "solve.stability": ("stability", "stability_of"),

@@ -12,6 +12,7 @@ from contextlib import nullcontext
 from towatlas import __version__
 from towatlas.commands import (
     build,
+    certify,
     critical,
     design,
     device,
@@ -35,6 +36,7 @@ from towatlas.tables.seal import AtlasFileError
 # In the order in which help lists them.
 COMMANDS = (
     critical,
+    certify,
     folds,
     equilibria,
     stability,

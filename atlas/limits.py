@@ -83,6 +83,7 @@ def threshold_length(w_f: ArrayLike, n: ArrayLike = 1) -> Array:
     Notes
     -----
     lambda_cn = 2 n - 1 + sqrt(1 + w_f^2) - w_f. Near it gamma_cn grows without bound, as (lambda - lambda_cn)^(-1/2).
+    That there is none at and below it, and one beyond: docs/proofs.md, Theorems 1 and 5.
 
     References
     ----------

@@ -6,7 +6,7 @@ import time
 
 import numba
 
-from benchmarks import coldstart, drag, figures, folds, lookup, report, shots, targets
+from benchmarks import coldstart, drag, figures, folds, lookup, report, shots, stability, targets
 from benchmarks.peers_shots import missing
 from benchmarks.samples import ROOT
 from benchmarks.timing import Row
@@ -68,6 +68,7 @@ def main() -> int:
     found += targets.of_lookup(lookup_rows)
     numba.set_num_threads(threads)
     found += drag.run(_say)
+    stability.run(_say)
     worst = lookup.whole_domain(table)
     shell = lookup.shell(default_path())
 

@@ -48,6 +48,16 @@ STYLES = {
     "solve_drag_folds, one a call": (OURS, "*"),
     "Newton, the guesses of the peers": (OURS, "*"),
     "folds": (OURS, "*"),
+    "stability": (OURS, "*"),
+    "order 20, shorter steps": ("#f08080", "o"),
+    "Galerkin, panels of 5": ("#1b7f3b", "s"),
+    "Galerkin, panels of 2.5": ("#8fd19e", "D"),
+    "Galerkin, one panel": ("#5e3c99", "H"),
+    "Evans, SciPy DOP853": ("#e07a00", ">"),
+    "Evans, SciPy LSODA": ("#f4b942", "<"),
+    "Evans, RK4": ("black", "v"),
+    "finite differences, eigs": ("#2f7ed8", "^"),
+    "chain of links": ("#6f4518", "X"),
     "counts of shapes": ("#6f4518", "X"),
     "RegularGridInterpolator linear": ("#2f7ed8", "s"),
     "RegularGridInterpolator cubic": ("#0b3c8c", "D"),
@@ -214,6 +224,20 @@ def drag_folds(pairs: list[Row], octaves: list[Row], path: Path) -> None:
     both[0].set_ylim(FLOOR, 1e1)
     both[0].set_ylabel("relative error of gamma [-]")
     figure.text(0.1, -0.03, KEY, fontsize=8.5)
+    _finish(figure, path)
+
+
+def stability(rows: list[Row], path: Path) -> None:
+    """Growth rates."""
+    figure, axes = plt.subplots(figsize=(9.0, 5.8))
+    panel(axes, rows, "sigma")
+    axes.set(xlabel="time per eigenvalue [us], one thread", ylabel="error of the leading eigenvalue over gamma [-]")
+    axes.set_ylim(FLOOR, 1e1)
+    marks = {"stability": ("stability", (-2, 9), "right")}
+    sides = {"Galerkin, one panel": ((0, 11), "center"), "finite differences, eigs": ((-6, -16), "center")}
+    _labelled(axes, rows, "sigma", marks, sides, "lower center")
+    axes.set_title("The leading growth rate of five shapes, from a guess that is off by 0.1 %", loc="left")
+    figure.text(0.1, -0.02, KEY, fontsize=8)
     _finish(figure, path)
 
 

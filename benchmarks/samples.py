@@ -1,7 +1,8 @@
-"""Random cables and shots over the whole domain of the atlas, and their answers to 30 digits, kept in files.
+"""Random cables and shots over the whole domain of the atlas, and their answers to 34 digits, kept in files.
 
-`python -m benchmarks.samples` computes the answers anew (about ten minutes): docs/data/reference_shots.csv and
-docs/data/reference_folds.csv, by the shots of tests/reference.py, which share nothing with the kernels.
+`python -m benchmarks.samples` computes the answers anew (half an hour): docs/data/reference_shots.csv and
+docs/data/reference_folds.csv, by the shots of tests/reference.py in 50 digits, which share nothing with the kernels.
+`python -m benchmarks.digits` says how many digits of the files shots in 66 leave as they are.
 """
 
 import csv
@@ -18,7 +19,8 @@ import towatlas
 ROOT = Path(__file__).parent.parent
 DATA = ROOT / "docs" / "data"
 SEED = 2026
-DIGITS = 30
+# Of the answers; and of the shots, which lose some to what they amplify.
+DIGITS, WORKING = 34, 50
 SHOTS, FOLDS = 600, 200
 
 Array = NDArray[np.float64]
@@ -121,23 +123,23 @@ def fold_reference() -> FoldReference:
     )
 
 
-def exact_shots(a: Array, mu: Array, tau: Array) -> list[dict[str, str]]:
-    """The shots in 34 digits; rows of a file."""
+def exact_shots(a: Array, mu: Array, tau: Array, digits: int = WORKING) -> list[dict[str, str]]:
+    """The shots; rows of a file."""
     from mpmath import mp
 
     slow = _mpmath_shots()
     rows = []
     for start in zip(a.tolist(), mu.tolist(), tau.tolist(), strict=True):
-        end = slow.shot(*start)
+        end = slow.shot(*start, digits)
         with mp.workdps(DIGITS + 5):
-            answers = {name: mp.nstr(value, DIGITS) for name, value in (("p", end.p), ("q", end.q), ("f", end.f))}
+            answers = {name: mp.nstr(getattr(end, name), DIGITS, strip_zeros=False) for name in ("p", "q", "f")}
             scales = {name: repr(float(getattr(end, name))) for name in ("amplitude", "q_amplitude")}
         rows.append(dict(zip(("a", "mu", "tau"), map(repr, start), strict=True)) | answers | scales)
     return rows
 
 
-def exact_folds(n: NDArray[np.int64], w_f: Array, lam: Array) -> list[dict[str, str]]:
-    """Critical speeds: the direct solution and a Newton step in 34 digits, which squares its error; rows of a file."""
+def exact_folds(n: NDArray[np.int64], w_f: Array, lam: Array, digits: int = WORKING) -> list[dict[str, str]]:
+    """Critical speeds, from the direct solution by Newton's method; rows of a file."""
     from mpmath import mp
 
     slow = _mpmath_shots()
@@ -145,10 +147,10 @@ def exact_folds(n: NDArray[np.int64], w_f: Array, lam: Array) -> list[dict[str, 
     rows = []
     for i in range(len(n)):
         a = abs(float(states.x_f[i])) * float(states.gamma[i]) ** 2
-        steps = slow.fold_step(int(n[i]), float(w_f[i]), float(lam[i]), a, float(states.gamma[i]))
+        gamma = slow.fold(int(n[i]), float(w_f[i]), float(lam[i]), a, float(states.gamma[i]), digits)
         with mp.workdps(DIGITS + 5):
-            gamma = mp.nstr(mp.mpf(float(states.gamma[i])) * mp.exp(steps[1]), DIGITS)
-        rows.append({"n": str(n[i]), "w_f": repr(float(w_f[i])), "lam": repr(float(lam[i])), "gamma": gamma})
+            answer = mp.nstr(gamma, DIGITS, strip_zeros=False)
+        rows.append({"n": str(n[i]), "w_f": repr(float(w_f[i])), "lam": repr(float(lam[i])), "gamma": answer})
     return rows
 
 
@@ -169,18 +171,27 @@ def write_table(path: Path, comment: str, rows: list[dict[str, str]]) -> None:
         writer.writerows(rows)
 
 
+def shots_of_file() -> tuple[Array, Array, Array]:
+    """(a, mu, tau) of docs/data/reference_shots.csv: `shots` follow the solver of the day in their last digits."""
+    c = columns(DATA / "reference_shots.csv")
+    return doubles(c["a"]), doubles(c["mu"]), doubles(c["tau"])
+
+
 def main() -> None:
+    digits = f"{DIGITS} digits, Taylor of order {WORKING + 2} in {WORKING} digits of mpmath"
+    write_table(
+        DATA / "reference_folds.csv",
+        f"Critical speeds gamma_cn of doubles n, w_f, lam. {digits}.\n"
+        f"Sample: benchmarks.samples.cables, numpy default_rng seed {SEED}; confirmed by python -m benchmarks.digits.",
+        exact_folds(*cables(FOLDS)),
+    )
     write_table(
         DATA / "reference_shots.csv",
         f"Fish-up shots from (a, mu) over tau of cable, lengths over g/Omega^2: p, q = dp/da and f at their ends.\n"
-        f"34 digits, Taylor of order 36 in mpmath; sample: benchmarks.samples.shots, numpy default_rng seed {SEED}.\n"
-        "Amplitudes are sqrt(p^2 + f^2/r) and sqrt(q^2 + v^2/r).",
-        exact_shots(*shots(SHOTS)),
-    )
-    write_table(
-        DATA / "reference_folds.csv",
-        f"Critical speeds gamma_cn. 34 digits, in mpmath; sample: benchmarks.samples.cables, default_rng seed {SEED}.",
-        exact_folds(*cables(FOLDS)),
+        f"{digits}; confirmed by python -m benchmarks.digits.\n"
+        f"Sample: benchmarks.samples.shots, numpy default_rng seed {SEED}.\n"
+        "Amplitudes, doubles, are sqrt(p^2 + f^2/r) and sqrt(q^2 + v^2/r).",
+        exact_shots(*shots_of_file()),
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks import (
+    digits,
     drag,
     figures,
     folds,
@@ -14,14 +15,17 @@ from benchmarks import (
     methods_shots,
     peers_drag,
     peers_folds,
+    peers_stability,
     report,
     samples,
     samples_drag,
     shots,
+    stability,
     targets,
     targets_drag,
 )
 from benchmarks.timing import LOST, Row
+from towatlas.limits import threshold_length
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +53,20 @@ def test_the_files_hold_what_they_say():
     n, w_f, lam = samples.cables(samples.FOLDS)
     for ours, drawn in ((critical.n, n), (critical.w_f, w_f), (critical.lam, lam)):
         np.testing.assert_allclose(ours, drawn, rtol=1e-12)
-    row = samples.exact_folds(n[:1], w_f[:1], lam[:1])[0]
-    assert critical.gamma[0][0] == float(row["gamma"])
+
+
+@pytest.mark.slow
+def test_the_files_have_the_digits_that_they_say():
+    """All 34 of them, by shots in 66: of the shortest shots, and of the fold nearest to its threshold, the hardest."""
+    known = samples.columns(samples.DATA / "reference_shots.csv")
+    a, mu, tau = samples.shots_of_file()
+    i = np.argsort(tau / np.hypot(1.0, a))[:2]
+    again = samples.exact_shots(a[i], mu[i], tau[i], digits.CHECK)
+    assert [[known[name][j] for name in "pqf"] for j in i] == [[row[name] for name in "pqf"] for row in again]
+    cables = samples.cables(samples.FOLDS)
+    near = np.argmin(samples.fold_reference().lam - threshold_length(cables[1], cables[0]))
+    row = samples.exact_folds(*(column[near : near + 1] for column in cables), digits.CHECK)[0]
+    assert samples.columns(samples.DATA / "reference_folds.csv")["gamma"][near] == row["gamma"]
 
 
 def test_every_method_converges_to_the_reference(shot_rows):
@@ -151,6 +167,41 @@ def test_a_bare_tip_of_the_peers_is_ours():
 
 def test_targets_with_drag():
     assert all(target.value > 0.0 for target in targets_drag.measure(8, (2, 2), 16, full=False, growth=(1, 3)))
+
+
+def test_growth_rates(tmp_path):
+    """Each method converges; what its order says of it, not what it was."""
+    rows = {row.method: row for row in stability.measure(full=False)}
+    bounds = {
+        stability.OURS: 1e-14,
+        "Evans, SciPy DOP853": 1e-7,
+        "Galerkin, panels of 5": 1e-6,
+        "finite differences, eigs": 1e-3,
+        "chain of links": 1e-2,
+    }
+    assert set(rows) == set(bounds)
+    for method, bound in bounds.items():
+        assert rows[method].quantile("sigma", 0.5) < bound, method
+    figures.stability(list(rows.values()), tmp_path / "stability")
+    assert {path.suffix for path in tmp_path.iterdir()} == {".svg", ".png"}
+
+
+def test_finite_differences_are_of_second_order():
+    case = stability.CASES[0]
+    errors = [
+        abs(peers_stability.by_finite_differences(case.found, case.found.expected, stability.reference()[0], n) - exact)
+        for n in (100, 200)
+        for exact in stability.reference()[:1]
+    ]
+    assert errors[0] / errors[1] == pytest.approx(4.0, abs=0.2)
+
+
+def test_the_file_of_growth_rates_holds_what_it_says():
+    """The shortest of its shots computed anew, on a mesh that is none of this project's."""
+    k = [case.name for case in stability.CASES].index("water")
+    case, exact = stability.CASES[k], stability.reference()[k]
+    again = peers_stability.exact(case.found, case.found.expected, exact * (1.0 + 1e-6), np.ones(40))
+    assert abs(again - exact) < 1e-15
 
 
 def test_lookup(table):

@@ -33,7 +33,7 @@ from math import sqrt
 import numpy as np
 
 from towatlas.kernels.compiling import helper
-from towatlas.kernels.steppers import ORDER, TRUNCATION
+from towatlas.kernels.steppers import ORDER
 from towatlas.kernels.system import B_S, C_F, C_S, C_T, LAM, M_F, W_F, C, W
 from towatlas.kernels.vector import LANES, absolute, broadcast, load, square_root, store, where_less
 
@@ -57,9 +57,8 @@ RESULT_ROWS = 8
 TIP_REACH, TIP_REACH_SIDE = 1e-9, 1e-16
 # The same for a fish with drag alone, whose cable begins along the flow, where g is no series: squared it is rounding.
 FLOW_REACH = 1e-8
-# Error of the force, in units of that of the wave, at which a step has gone past the axis.
-PAST_AXIS = 1e-15
-LOG_TRUNCATION = np.log(TRUNCATION)
+# Error of the force, in units of that of the wave and of the truncation, at which a step has gone past the axis.
+PAST_AXIS = 10.0
 
 # What a row of a program does at order k, jets all: columns are the operation, a, b, q, a number and the group of rows
 # that it is switched with. p is a parameter; PRODUCT q += n a b, AHEAD the same one order ahead, RATE q' += n a b,
@@ -182,11 +181,21 @@ EVERY_GROUP = np.full(GROUPS, True)
 @helper
 def _add_product(c, a, b, k, first, last, factor, pairs, count, q, at):
     """Add factor times the terms first..last-1 of coefficient k of the product of a and b to that of q at `at`."""
+    if last <= first:
+        return
     for m in range(pairs.shape[0]):
         i, j = pairs[m, 0], pairs[m, 1]
         left, right = (a * count + i) * KEPT, (b * count + j) * KEPT + k
         one = broadcast(0.0)
-        if i == j or a == b:
+        if a == b and i == j:
+            # Its terms come in twos, but for one in the middle.
+            half = (first + last) // 2
+            for order in range(first, half):
+                one = one + load(c, left + order) * load(c, right - order)
+            one = one + one
+            if (last - first) % 2 == 1:
+                one = one + load(c, left + half) * load(c, right - half)
+        elif i == j or a == b:
             for order in range(first, last):
                 one = one + load(c, left + order) * load(c, right - order)
             if i != j:
@@ -320,8 +329,8 @@ def expand_jets(c, p, jets, pairs, count, groups):
 
 
 @helper
-def step_lengths(c, p, count, room, h):
-    """Steps at which the last two terms reach the truncation bound, relative to the local amplitudes.
+def step_lengths(c, p, count, truncation, room, h):
+    """Steps at which the last two terms reach the truncation, relative to the local amplitudes.
 
     The amplitude is that of the wave, sqrt(rho^2 + f^2 / T), f the horizontal force. The first variation is held to
     its own, the others to the larger of their own and that of the solution.
@@ -362,10 +371,11 @@ def step_lengths(c, p, count, room, h):
                 last = where_less(last, size, size, last)
     store(room, ZERO, last_but_one)
     store(room, FIRST, last)
+    limit = np.log(truncation)
     for lane in range(LANES):
         # numpy's functions, for the nothing in an idle lane: interpreted, those of the module math would raise.
-        by_one = (LOG_TRUNCATION - np.log(room[lane])) / (ORDER - 1.0)
-        by_other = (LOG_TRUNCATION - np.log(room[LANES + lane])) / ORDER
+        by_one = (limit - np.log(room[lane])) / (ORDER - 1.0)
+        by_other = (limit - np.log(room[LANES + lane])) / ORDER
         h[lane] = np.exp(min(by_one, by_other))
 
 

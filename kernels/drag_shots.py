@@ -121,7 +121,7 @@ def landing(c, pace, count, lane, remaining, h):
 
 
 @helper
-def past_axis(c, p, new, h, count, room):
+def past_axis(c, p, new, h, count, truncation, room):
     """Into room: how far steps have gone past the axis, above 1 where too far.
 
     Close by, g = T |V_n| and rho are all but absolute values of smooth functions, of which the series know one branch
@@ -131,7 +131,7 @@ def past_axis(c, p, new, h, count, room):
     along = x * load(new, FX * count) + y * load(new, FY * count)
     rho2 = x * x + y * y
     step = load(h, ZERO)
-    limit = PAST_AXIS * square_root(load(c, T * count * KEPT)) / load(p, PACE * count)
+    limit = PAST_AXIS * truncation * square_root(load(c, T * count * KEPT)) / load(p, PACE * count)
     normal = absolute(values(c, G * count * KEPT, ZERO, step) - square_root(fz * fz * rho2 + along * along))
     store(room, ZERO, load(p, KAPPA * count) * normal * step / limit)
     rho = square_root(rho2)
@@ -237,8 +237,11 @@ def _commit(c, new, h, ended, jobs, work, count, max_steps, reached, over, room)
 
 
 @kernel
-def shoot_drag(shots, algebra, max_steps, reached, begin, stop):
-    """Shots begin..stop-1 of those given; results go to the same rows of `reached`."""
+def shoot_drag(shots, algebra, truncation, max_steps, reached, begin, stop):
+    """Shots begin..stop-1 of those given; results go to the same rows of `reached`.
+
+    truncation : error of a step, relative to the local amplitudes.
+    """
     count = reached.state.shape[2]
     # The jets 1 and log r.
     fast = count == COUNT and algebra.places[0] == 1
@@ -292,7 +295,7 @@ def shoot_drag(shots, algebra, max_steps, reached, begin, stop):
             expand_slopes(c, p, groups[ON_TANGENT])
         else:
             expand_jets(c, p, algebra.products, algebra.pairs, count, groups)
-        step_lengths(c, p, count, room, h)
+        step_lengths(c, p, count, truncation, room, h)
         store(room, SECOND, values(c, U * count * KEPT, FIRST, load(h, ZERO)))
         for lane in range(LANES):
             ended[lane] = False
@@ -316,7 +319,7 @@ def shoot_drag(shots, algebra, max_steps, reached, begin, stop):
             again = False
             if not groups[ACROSS]:
                 break
-            past_axis(c, p, new, h, count, room)
+            past_axis(c, p, new, h, count, truncation, room)
             for lane in range(LANES):
                 past = room[lane] > 1.0 or (groups[ON_SIDE] and room[LANES + lane] > 1.0)
                 if past and jobs[lane] != IDLE:

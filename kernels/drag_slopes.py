@@ -62,23 +62,31 @@ def _times(a, a1, b, b1):
 
 
 @helper
-def _square(c, at, k):
-    """Order k of the square of a quantity."""
-    s = t = v = broadcast(0.0)
+def _squares(c, first, second, k):
+    """Order k of the squares of two quantities."""
+    s = t = v = q = r = w = broadcast(0.0)
     half = (k + 1) // 2
     for o in range(half):
-        a, a1 = _get(c, at, o)
-        b, b1 = _get(c, at, k - o)
+        a, a1 = _get(c, first, o)
+        b, b1 = _get(c, first, k - o)
         s = s + a * b
         t = t + a * b1
         v = v + a1 * b
-    s = s + s
-    t = t + v
+        a, a1 = _get(c, second, o)
+        b, b1 = _get(c, second, k - o)
+        q = q + a * b
+        r = r + a * b1
+        w = w + a1 * b
+    s, t = s + s, t + v
+    q, r = q + q, r + w
     if k % 2 == 0:
-        a, a1 = _get(c, at, half)
+        a, a1 = _get(c, first, half)
         s = s + a * a
         t = t + a * a1
-    return s, t + t
+        a, a1 = _get(c, second, half)
+        q = q + a * a
+        r = r + a * a1
+    return s, t + t, q, r + r
 
 
 @helper
@@ -203,17 +211,14 @@ def expand_slopes(c, p, tangential):
         _put(c, X_, j, -(share * fx), -(share * fx1))
         _put(c, Y_, j, -(share * fy), -(share * fy1))
         _put(c, H_, j, share * fz, share * fz1)
-        a, a1 = _square(c, X_, j)
-        q, q1 = _square(c, Y_, j)
-        a = a + q
-        a1 = a1 + q1
+        a, a1, q, q1 = _squares(c, X_, Y_, j)
+        a, a1 = a + q, a1 + q1
         _put(c, RHO2_, j, a, a1)
         half = inverse_pace * (-0.5 * j)
         d, d1 = a * half, a1 * half
         _put(c, D_, k, d, d1)
-        z, z1 = _square(c, FZ_, k)
+        z, z1, t2, t21k = _squares(c, FZ_, T_, k)
         _put(c, FZ2_, k, z, z1)
-        t2, t21k = _square(c, T_, k)
         _put(c, T2_, k, t2, t21k)
         m, m1, tx, tx1, ty, ty1 = _known_sums(c, k)
         s, s1, gg, gg1, gb, gb1, gx, gx1, gy, gy1, bt, bt1, ex, ex1, ey, ey1, ez, ez1 = _inner_sums(c, k)

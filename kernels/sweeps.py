@@ -4,12 +4,15 @@ Every row is written by index and computed the same way wherever it falls, so th
 bit for any number of threads. One parallel call costs about a millisecond: for a few rows call the serial kernel.
 """
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numba
 
 from towatlas.kernels.compiling import parallel_kernel
 from towatlas.kernels.drag_shots import Algebra, Reached, Shots, shoot_drag
+from towatlas.kernels.drag_stiff import Marched, shoot_stiff
 from towatlas.kernels.folds import Cables, Folds, solve_folds
 from towatlas.kernels.lanes import march
 from towatlas.kernels.scan import forward_shots, scan_system
@@ -65,23 +68,32 @@ def _scan_systems(lam, w_f, gamma_low, gamma_high, speeds, guesses, segments, n_
         )
 
 
-def shoot_drag_threads(shots: Shots, algebra: Algebra, max_steps: int, reached: Reached, begin: int, stop: int) -> None:
+def shoot_drag_threads(
+    shots: Shots, algebra: Algebra, truncation: float, max_steps: int, reached: Reached, begin: int, stop: int
+) -> None:
     """`shoot_drag` over blocks of rows, on as many threads as numba is allowed."""
+    _in_threads(
+        lambda first, last: shoot_drag(shots, algebra, truncation, max_steps, reached, first, last), begin, stop
+    )
+
+
+def shoot_stiff_threads(marched: Marched, system: Any, tolerance: float, max_steps: int, begin: int, stop: int) -> None:
+    """`shoot_stiff` over blocks of rows, on as many threads as numba is allowed."""
+    _in_threads(lambda first, last: shoot_stiff(marched, system, tolerance, max_steps, first, last), begin, stop)
+
+
+def _in_threads(shoot: Callable[[int, int], None], begin: int, stop: int) -> None:
     # Few blocks, for at the end of each the longest shot leaves the other lanes idle; a few for each thread, to share.
     threads = numba.get_num_threads()
     block = stop - begin if threads < 2 else max(DRAG_BLOCK, -(-(stop - begin) // (BLOCKS_A_THREAD * threads)))
     begins = range(begin, stop, block)
     threads = min(len(begins), threads)
-
-    def shoot(first: int) -> None:
-        shoot_drag(shots, algebra, max_steps, reached, first, min(stop, first + block))
-
     if threads < 2:
         for first in begins:
-            shoot(first)
+            shoot(first, min(stop, first + block))
         return
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(shoot, begins))
+        list(pool.map(lambda first: shoot(first, min(stop, first + block)), begins))
 
 
 march_parallel = parallel_kernel(_march)

@@ -78,7 +78,7 @@ from towatlas.kernels.drag import (
     values,
 )
 from towatlas.kernels.drag_shots import IDLE, begin_lanes, landing, past_axis
-from towatlas.kernels.steppers import ORDER
+from towatlas.kernels.steppers import ORDER, TRUNCATION
 from towatlas.kernels.system import C_F, M_F, W_F
 from towatlas.kernels.vector import LANES, aligned, broadcast, load, store
 
@@ -223,7 +223,7 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
         while busy:
             expand_jets(c, p, algebra.products, algebra.pairs, count, groups)
             _expand_matrices(c, p, algebra, groups)
-            step_lengths(c, p, count, room, h)
+            step_lengths(c, p, count, TRUNCATION, room, h)
             for lane in range(LANES):
                 if jobs[lane] != IDLE:
                     h[lane] = _shorten(c, p, h[lane], lane, reach[jobs[lane]], bound)
@@ -243,7 +243,7 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
                 again = False
                 if not groups[ACROSS]:
                     break
-                past_axis(c, p, new, h, count, room)
+                past_axis(c, p, new, h, count, TRUNCATION, room)
                 for lane in range(LANES):
                     past = room[lane] > 1.0 or (groups[ON_SIDE] and room[LANES + lane] > 1.0)
                     if past and jobs[lane] != IDLE:

@@ -4,10 +4,10 @@ from math import log
 
 import numpy as np
 import pytest
-from chain import Chain
 from scipy.integrate import solve_ivp
 
 import towatlas
+from benchmarks.chain import Chain
 
 # lam, w_f, gamma and the fluid.
 CASES = {

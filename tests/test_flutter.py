@@ -7,6 +7,7 @@ import pytest
 from helpers import run
 
 import towatlas
+from towatlas.solve.follower import Follower
 from towatlas.solve.growth import WEAK
 
 AIR = {"C": 0.018}
@@ -32,6 +33,21 @@ def test_hopf_points_that_are_known(span, edge, low):
     nearest = min(kinds, key=lambda gamma: abs(gamma - edge))
     assert nearest == pytest.approx(edge, abs=1e-10)
     assert kinds[nearest] == "hopf"
+
+
+def test_an_edge_takes_few_shots(monkeypatch):
+    """Secants that keep a bracket, not halvings of it, of which 1e-13 would take forty."""
+    taken, mode = [], Follower.mode
+    monkeypatch.setattr(Follower, "mode", lambda *given: taken.append(given[3]) or mode(*given))
+    towatlas.flutter(37.8, 1352.0, (6.0, 6.05), **AIR)
+    assert 0 < len(taken) < 16
+
+
+def test_weak_is_said_of_the_largest_growth():
+    """Which may lie between the speeds that are looked at."""
+    windows = towatlas.flutter(37.8, 1352.0, (4.7, 5.2), **AIR).windows
+    assert windows
+    assert all(window.weak == (window.growth < WEAK * window.gamma) for window in windows)
 
 
 def test_krein_collisions_that_are_known():

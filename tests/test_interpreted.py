@@ -24,6 +24,7 @@ from towatlas.kernels.scan import forward_shots, scan_system
 from towatlas.kernels.sweeps import forward_shots_parallel, scan_systems_parallel, solve_folds_parallel
 from towatlas.limits import excess_length, long_cable, massless_cable
 from towatlas.solve.jets import jets_of
+from towatlas.solve.looks import TOLERANCE, look_stiffly
 from towatlas.solve.members import shoot_singly
 from towatlas.solve.motion import motions
 from towatlas.solve.shots import direction_of
@@ -168,6 +169,21 @@ def test_drag_without_drag_is_the_vacuum():
     x, y = drag_shot(0)[:2]
     assert x[:2] == pytest.approx([lanes.p[0], a * lanes.q[0]], abs=1e-14 * a)
     assert not y[:2].any()
+
+
+@pytest.mark.parametrize("case", [1, 2, 4])
+def test_stiff_shots_are_those_of_the_series(case):
+    gamma, r, system = DRAG[case]
+    found = look_stiffly(np.array([r * gamma**2]), np.array([gamma]), system.row()[None])
+    assert found.status[0] == status.OK
+    x, y = drag_shot(case)[:2, :2] / gamma**2
+    # Some ten steps, each with this error.
+    close = pytest.approx(0.0, abs=30 * TOLERANCE * np.hypot(x[0], y[0]))
+    assert found.X[0, 0] - x[0] == close
+    assert found.Y[0, 0] - y[0] == close
+    close = pytest.approx(0.0, abs=30 * TOLERANCE * np.hypot(x[1], y[1]))
+    assert found.X[0, 1] - x[1] == close
+    assert found.Y[0, 1] - y[1] == close
 
 
 @pytest.mark.parametrize("case", range(len(DRAG)))

@@ -6,6 +6,7 @@ from typing import Any
 
 from towatlas.commands.common import OK
 from towatlas.tables.atlas import Atlas
+from towatlas.tables.certified import METHOD, read_certified
 from towatlas.tables.file import default_path, read_root
 
 
@@ -23,11 +24,16 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     attributes, _, seal = read_root(options.file)
     rows = {"file": str(options.file)}
-    if attributes.get("method") != "scan":
+    if attributes.get("method") == METHOD:
+        rows |= {"holds": "proofs of nodes of an atlas"} | read_certified(options.file).facts()
+    elif attributes.get("method") != "scan":
         atlas = Atlas(options.file)
         rows["holds"] = ", ".join(atlas.holds)
         for part in atlas.parts:
             rows |= part.domain()
+        beside = options.file.with_name("certified.nc")
+        if beside.exists() and (proofs := read_certified(beside)).atlas_seal == seal:
+            rows |= {f"{beside.name}: {name}": text for name, text in proofs.facts().items()}
     for name in sorted(attributes):
         value = attributes[name]
         rows[name] = format(value, ".2g") if isinstance(value, float) else str(value)

@@ -7,7 +7,7 @@ from typing import Any
 from towatlas.commands.common import OK, add_patience, say
 from towatlas.report.sources import SOURCES, write_report
 
-# Of a page, s of CPU; they take a quarter of it.
+# Of a page, s of CPU; they take a third of it at most.
 SECONDS = 120.0
 
 

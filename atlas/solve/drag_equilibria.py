@@ -9,7 +9,8 @@ from towatlas.kernels import status
 from towatlas.kernels.system import LAM
 from towatlas.numerics.rows import EPS
 from towatlas.results import Equilibria
-from towatlas.solve.search import PREDICTED, SLOPE, Found, search
+from towatlas.solve.looks import SLOPE
+from towatlas.solve.search import FIRST_LOW, PREDICTED, Found, least_radius, search
 from towatlas.solve.shots import Array, Integers, shoot
 from towatlas.system import System
 
@@ -62,6 +63,8 @@ def _searched(found: Found, row: Array, gamma: float) -> str:
         f"fish radius {np.exp(found.low[0]) / unit:.1e} to {1.0 + row[0, LAM]:.6g} tow radii, {found.shots[0]} shots "
         f"with derivative, refined until each predicts its neighbours within {PREDICTED:g} tow radii"
     )
+    if least_radius(row, np.array([gamma]))[0] > FIRST_LOW:
+        text += "; energy allows none nearer to the axis"
     low, high = found.unsearched[0]
     if np.isfinite(low):
         sentence = status.SENTENCES[int(found.status[0])]

@@ -86,7 +86,7 @@ def equilibria(
     -----
     In a vacuum complete by construction: the offsets at which the number of zeros of q = dp/da along the shot changes
     separate monotone pieces of p(t_e; a), each of which holds at most one equilibrium and one mirrored one. Their
-    number is 1 + 2 #{n : gamma > gamma_cn}.
+    number is 1 + 2 #{n : gamma > gamma_cn}: docs/proofs.md, Theorem 6.
 
     References
     ----------
@@ -222,7 +222,7 @@ def _failure(system: System, gamma: float, code: int) -> ArithmeticError:
 def _highest(system: System, gamma: float) -> int:
     """Highest pair of equilibria that one cable may have in a vacuum."""
     # Extrema too low to reach gamma^2 are as many as the half waves of a straight cable, millions at high speeds: of
-    # those beyond the last n with a transition only one is looked for, as a check on the closed form.
+    # those beyond the last n with a transition (docs/proofs.md, Theorem 1) only one is looked for, as a check.
     lam, w_f = system.lam, system.w_f
     half_waves = 2.0 / np.pi * gamma * lam / (np.sqrt(w_f + lam) + np.sqrt(w_f))
     possible = float(np.ceil((lam + 1.0 - threshold_offset(w_f)) / 2.0))

@@ -170,17 +170,17 @@ class Follower:
         damped = still.spectrum.roots.sigma[still.spectrum.roots.sigma.real <= 0.0]
         ends = [(still.t, _nearest(damped, sigma)), (growing.t, sigma)]
         heights = [ends[0][1].real, sigma.real]
-        t, here = growing.t, sigma
+        t, here, side = growing.t, sigma, 1
         for _ in range(ROUNDS):
             share = heights[0] / (heights[0] - heights[1])
-            t = ends[0][0] + share * (ends[1][0] - ends[0][0])
+            last, t = t, ends[0][0] + share * (ends[1][0] - ends[0][0])
             here = self.mode(still, growing, t, ends[0][1] + share * (ends[1][1] - ends[0][1]))
-            side = int(here.real > 0.0)
-            moved = abs(ends[side][0] - t)
-            # The end that stays counts half, so that it is not kept for ever.
-            heights[1 - side] *= 0.5
+            again, side = side, int(here.real > 0.0)
+            if side == again:
+                # The other end has stayed: it counts half, so that it is not kept for ever.
+                heights[1 - side] *= 0.5
             ends[side], heights[side] = (t, here), here.real
-            if moved < SETTLED or abs(here.real) < EPS:
+            if abs(t - last) < SETTLED or abs(here.real) < EPS:
                 break
         return t, here.imag
 
@@ -242,9 +242,9 @@ class Follower:
             else:
                 group.append(mode)
         for group in sorted(groups, key=lambda group: group[0].start.t):
-            yield self.window(group, weak=weak[id(group[0])])
+            yield self.window(group)
 
-    def window(self, modes: list[Mode], weak: bool) -> Window:
+    def window(self, modes: list[Mode]) -> Window:
         """The window of the first of some modes."""
         first, last = modes[0].start, modes[0].end
         best, sample, growth = modes[0], modes[0].samples[0], 0.0
@@ -265,7 +265,7 @@ class Follower:
             high_frequency=last.frequency * high,
             growth=growth,
             gamma=self.speed(sample.t),
-            weak=weak,
+            weak=growth < WEAK * self.speed(sample.t),
         )
 
     def _summit(self, mode: Mode, sample: Sample, growth: float) -> tuple[Sample, float]:

@@ -4,7 +4,7 @@ On the shots of a cable (mu, tau) the number of zeros of q = dp/da falls, as the
 to zero. Each fall is an extremum of p(t_e; a), the n-th of them (from outside) with the sign (-1)^n; where it exceeds
 gamma^2 the n-th fold has been passed, and a pair of equilibria with n nodes lies about it: the inner member on the
 piece where the count is n, the outer one where it is n - 1. On each piece p is monotone, so whether a trial offset
-is above or below the wanted one is known from its count and its p alone.
+is above or below the wanted one is known from its count and its p alone. Proved: docs/proofs.md, Theorem 6.
 """
 
 from collections.abc import Callable
@@ -23,10 +23,11 @@ Integers = NDArray[np.int64]
 # Offsets, starts and lengths of shots to their ends (tau, f, p, z, v, q), zeros of q passed, statuses.
 Shoot = Callable[[Array, Array, Array], tuple[Array, Integers, Integers]]
 
-# An offset in the linear limit, and one below every equilibrium: |p| outgrows a by no more than sqrt(mu).
+# An offset in the linear limit, and one below every equilibrium: |p| outgrows a by no more than sqrt(1 + mu)
+# (docs/proofs.md, Lemma 3), which is enough up to mu = 1e24.
 LINEAR = 1e-12
-# The fish is never farther out than a straight cable reaches, |x_f| <= 1 + lambda; fast cables come so close to it
-# that the bracket needs slack.
+# The fish is never farther out than a straight cable reaches, |x_f| <= 1 + lambda (Lemma 3); fast cables come so
+# close to it that the bracket needs slack.
 BEYOND = 1.01
 ROUNDS = 200
 # Steps of one shot: with the default patience, two seconds or three; at most.

@@ -33,8 +33,8 @@ def folds_passed(*, lam: Array, w_f: Array, gamma: Array) -> Integers:
 
     Notes
     -----
-    Critical speeds rise with n: between one below gamma and one that is not, the next tried is where the closed form
-    of the guesses, scaled to the last speed found, has gamma.
+    Critical speeds rise with n (docs/proofs.md, Theorem 5): between one below gamma and one that is not, the next tried
+    is where the closed form of the guesses, scaled to the last speed found, has gamma.
     """
     low, high = np.zeros(len(lam), np.int64), _most_transitions(lam=lam, w_f=w_f) + 1
     scale = np.ones(len(lam))

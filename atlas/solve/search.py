@@ -8,16 +8,15 @@ method in brackets finds the roots. Systems are worked on side by side: every ro
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from towatlas.effort import check_foreseen, limited
 from towatlas.kernels import status
-from towatlas.kernels.system import LAM
+from towatlas.kernels.system import C_F, C_T, LAM, M_F, W_F, W
 from towatlas.numerics.hermite import cubic, cubic_coefficients
 from towatlas.numerics.rows import bracket
-from towatlas.solve.jets import jets_of
+from towatlas.solve.looks import SLOPE, look
 from towatlas.solve.shots import REMEDY, Array, Integers, shoot
-
-SLOPE = jets_of(1)
 
 # Points a decade at first; halvings of an interval at most; how well the interpolant of the tow point must predict the
 # middle of an interval, in tow radii; an extremum of log rho predicted to be this near to zero is solved for.
@@ -103,7 +102,8 @@ def search(systems: Array, gamma: Array) -> Found:
 
 class _Search:
     """A block of systems; points are kept sorted by system and x, with X, Y and their slopes over tow radius, log rho
-    and its slope, and the angle of the tow point; nan where a shot failed; last the steps of the shot."""
+    and its slope, and the angle of the tow point, nan where a shot failed; steps of the shot, and whether it is rough.
+    """
 
     def __init__(self, systems: Array, gamma: Array, first: int):
         self.systems, self.gamma, self.first = systems, gamma, first
@@ -129,35 +129,49 @@ class _Search:
             self.codes,
         )
 
-    def _shoot(self, rows: Integers, x: Array) -> Array:
-        """Values at points; shape (8, points)."""
-        ends = shoot(np.exp(x), self.gamma[rows], self.systems[rows], SLOPE)
+    def _look(self, rows: Integers, x: Array, rough: bool = True) -> Array:
+        """Values at points; shape (9, points)."""
+        found = look(np.exp(x), self.gamma[rows], self.systems[rows], rough=rough)
         np.add.at(self.shots, rows, 1)
-        bad = ends.status != status.OK
-        self.codes[rows[bad]] = ends.status[bad]
-        np.fmin.at(self.unsearched[:, 0], rows[bad], x[bad])
-        np.fmax.at(self.unsearched[:, 1], rows[bad], x[bad])
-        scale = 1.0 / self.scale[rows]
+        bad = self._note(rows, x, found.status)
         values = np.stack(
             [
-                ends.X[:, 0] * scale,
-                ends.Y[:, 0] * scale,
-                ends.X[:, 1] * scale,
-                ends.Y[:, 1] * scale,
-                *ends.log_rho.T,
-                ends.angle,
-                ends.steps,
+                *found.X[:, :1].T,
+                *found.Y[:, :1].T,
+                found.X[:, 1],
+                found.Y[:, 1],
+                *found.log_rho.T,
+                found.angle,
+                found.steps,
+                found.rough,
             ]
         )
-        values[:-1, bad | ~np.isfinite(values).all(axis=0)] = np.nan
+        values[:-2, bad | ~np.isfinite(values).all(axis=0)] = np.nan
         return values
+
+    def _shoot(self, rows: Integers, x: Array) -> Array:
+        """log rho and its slope at points, as well as they can be; shape (2, points)."""
+        ends = shoot(np.exp(x), self.gamma[rows], self.systems[rows], SLOPE)
+        np.add.at(self.shots, rows, 1)
+        values = ends.log_rho.T.copy()
+        values[:, self._note(rows, x, ends.status)] = np.nan
+        return values
+
+    def _note(self, rows: Integers, x: Array, codes: Integers) -> NDArray[np.bool_]:
+        """Which shots failed; noted down."""
+        bad = codes != status.OK
+        self.codes[rows[bad]] = codes[bad]
+        np.fmin.at(self.unsearched[:, 0], rows[bad], x[bad])
+        np.fmax.at(self.unsearched[:, 1], rows[bad], x[bad])
+        return bad
 
     def _range(self) -> tuple[Array, Array]:
         """Bounds of x: from the linear limit to a straight cable."""
         low, high = self._bounds()
-        open_ = np.arange(len(low))
+        # Where energy bounds the range nothing is below it.
+        open_ = np.flatnonzero(low <= np.log(FIRST_LOW * self.scale))
         while len(open_):
-            log_rho, slope = self._shoot(open_, low[open_])[4:6]
+            log_rho, slope = self._look(open_, low[open_])[4:6]
             linear = (log_rho < np.log(LINEAR)) & (np.abs(slope - 1.0) < LINEAR)
             open_ = open_[~linear & (low[open_] > np.log(SMALLEST * self.scale[open_]))]
             low[open_] -= np.log(DOWN)
@@ -167,7 +181,8 @@ class _Search:
 
     def _bounds(self) -> tuple[Array, Array]:
         """Of x, at first."""
-        return np.log(FIRST_LOW * self.scale), np.log(self.scale * (1.0 + self.systems[:, LAM]) * BEYOND)
+        low = np.maximum(FIRST_LOW, least_radius(self.systems, self.gamma) / BEYOND)
+        return np.log(low * self.scale), np.log(self.scale * (1.0 + self.systems[:, LAM]) * BEYOND)
 
     def _foresee(self) -> None:
         """Refuse at once what would take longer than there is patience for, by a few shots of some systems."""
@@ -178,8 +193,8 @@ class _Search:
         low, high = (bound[some, None] for bound in self._bounds())
         x = low + PROBES * (high - low)
         rows = np.repeat(some, len(PROBES))
-        ends = shoot(np.exp(x.ravel()), self.gamma[rows], self.systems[rows], SLOPE)
-        values = np.stack([ends.angle, ends.steps]).reshape(2, *x.shape)
+        found = look(np.exp(x.ravel()), self.gamma[rows], self.systems[rows])
+        values = np.stack([found.angle, found.steps]).reshape(2, *x.shape)
         least = np.full((len(some), len(PROBES) - 1), EXPECTED_SHOTS / (len(PROBES) - 1.0))
         _check_foreseen(values[..., :-1], values[..., 1:], least, count / len(some))
 
@@ -192,7 +207,7 @@ class _Search:
 
     def _refined(self, rows: Integers, x: Array) -> tuple[Integers, Array, Array]:
         """Points halved until cubics through them tell the tow point wherever it may lie at the tow radius."""
-        values = self._shoot(rows, x)
+        values = self._look(rows, x)
         failed = np.isnan(values[4])
         # Between two shots that failed a third would.
         active = (rows[1:] == rows[:-1]) & ~(failed[1:] & failed[:-1])
@@ -200,33 +215,26 @@ class _Search:
             i = np.flatnonzero(active)
             if not len(i):
                 break
-            a, b = values[:, i], values[:, i + 1]
-            _check_foreseen(a[6:], b[6:], np.ones(len(i)))
+            _check_foreseen(values[6:8, i], values[6:8, i + 1], np.ones(len(i)))
             middle, width = 0.5 * (x[i] + x[i + 1]), x[i + 1] - x[i]
-            new = self._shoot(rows[i], middle)
-            # By value and by slope: where the points are too few for what goes on between, one of them may agree by
-            # accident.
-            middle_slope = 1.5 * (b[:2] - a[:2]) / width - 0.25 * (a[2:4] + b[2:4])
-            wrong = np.hypot(*(_between(a, b, width, 0.5) - new[:2]))
-            wrong = np.maximum(wrong, SLOPE_SHARE * width * np.hypot(*(middle_slope - new[2:4])))
-            line = _between(a[..., None], b[..., None], width[:, None], LOOKS)
-            away = np.hypot(*line) - 1.0
-            nearest = np.abs(away).min(axis=1)
-            # Next to a cusp three roots are where the radius hardly changes: the points must tell its smallest waves.
-            level = np.abs(np.diff(away, axis=1)) * (len(LOOKS) - 1) < FLAT * width[:, None]
-            flat = (level & (np.abs(away[:, 1:]) < NEAR_FOLD)).any(axis=1)
-            tolerance = np.where(flat, PREDICTED_FLAT, PREDICTED)
-            # Far from the tow radius by more than twice what the cubic is wrong, or right. Beside a shot that failed
-            # nothing is known, and nothing gained by more of them.
-            split = (wrong > tolerance) & (nearest < np.maximum(2.0 * wrong, np.where(flat, NEAR_FOLD, 0.0)))
-            # The angle about the axis counts nodes: where it changes more, waves may hide between the points.
-            split |= np.maximum(np.abs(new[6] - a[6]), np.abs(new[6] - b[6])) > TURNED
+            new = self._look(rows[i], middle)
+            split, flat = _to_split(values[:, i], values[:, i + 1], new, width)
+            vague = np.flatnonzero(flat & (values[8, i] + values[8, i + 1] + new[8] > 0.0))
+            if len(vague):
+                k = i[vague]
+                for points in (k, k + 1):
+                    values[:, points] = self._look(rows[points], x[points], rough=False)
+                new[:, vague] = self._look(rows[k], middle[vague], rough=False)
+                split, _ = _to_split(values[:, i], values[:, i + 1], new, width)
             order = np.lexsort((np.concatenate([x, middle]), np.concatenate([rows, rows[i]])))
             again = np.zeros(len(x), bool)
             again[i] = split
             active = np.concatenate([again, split])[order][:-1]
             rows, x = np.concatenate([rows, rows[i]])[order], np.concatenate([x, middle])[order]
             values = np.concatenate([values, new], axis=1)[:, order]
+        # The sides that roots are bracketed by.
+        vague = np.flatnonzero((values[8] > 0.0) & (np.abs(values[4]) < NEAR_FOLD))
+        values[:, vague] = self._look(rows[vague], x[vague], rough=False)
         return rows, x, values
 
     def _roots(self, rows: Integers, x: Array, values: Array, peaks: tuple[Integers, Array, Array, Integers]) -> tuple:
@@ -237,11 +245,12 @@ class _Search:
         rising = np.where(height[k + 1] > height[k], 1.0, -1.0)
 
         def radius(z: Array, i: Integers) -> tuple[Array, Array]:
-            value, slope = self._shoot(rows[k[i]], z)[4:6] * rising[i]
+            value, slope = self._shoot(rows[k[i]], z) * rising[i]
             return value, slope
 
         found, solved = bracket(radius, x[k], x[k + 1], last_step=LAST_STEP)
-        self.codes[rows[k[~solved]]] = status.NOT_CONVERGED
+        lost = rows[k[~solved]]
+        self.codes[lost[self.codes[lost] == status.OK]] = status.NOT_CONVERGED
         good = solved & np.isfinite(found)
         return rows[k[good]], found[good]
 
@@ -257,7 +266,7 @@ class _Search:
             return rows, x, values[4]
         near = np.abs(predicted[i]) < NEAR_FOLD
         peak, peak_row, left = peak[i], peak_row[i], left[i]
-        height = self._shoot(peak_row, peak)[4]
+        height = self._shoot(peak_row, peak)[0]
         # Those near zero, and those that are not where they were predicted, by false position on the slope, if the
         # slopes at the ends of their interval say that there is one extremum in it.
         side = np.where(values[5][left] > 0.0, -1.0, 1.0)
@@ -266,17 +275,50 @@ class _Search:
         )
 
         def slope(z: Array, k: Integers) -> tuple[Array, Array]:
-            along = self._shoot(peak_row[exact[k]], z)[5] * side[exact[k]]
+            along = self._shoot(peak_row[exact[k]], z)[1] * side[exact[k]]
             return along, np.full(len(z), np.nan)
 
         if len(exact):
             where, solved = bracket(slope, x[left[exact]], x[left[exact] + 1], start=peak[exact], resolution=LAST_STEP)
             good = solved & np.isfinite(where)
             peak[exact[good]] = where[good]
-            height[exact[good]] = self._shoot(peak_row[exact[good]], where[good])[4]
+            height[exact[good]] = self._shoot(peak_row[exact[good]], where[good])[0]
         rows, x = np.concatenate([rows, peak_row]), np.concatenate([x, peak])
         order = np.lexsort((x, rows))
         return rows[order], x[order], np.concatenate([values[4], height])[order]
+
+
+def least_radius(systems: Array, gamma: Array) -> Array:
+    """A radius of the fish, over tow radius, below which no cable reaches the tow radius.
+
+    Parameters
+    ----------
+    systems : ndarray, shape (systems, columns)
+        As of `System.row`.
+    gamma : ndarray, shape (systems,)
+        Speed [-].
+
+    Returns
+    -------
+    ndarray, shape (systems,)
+        Zero where there is none.
+
+    Notes
+    -----
+    Without tangential drag T + (X^2 + Y^2) / 2 - w h is the same all along the cable. At the tow point T > 0 and
+    |h| <= lam, so that at the fish T + r^2 / 2 exceeds 1 / 2 - |w| lam / gamma^2, lengths over tow radius.
+    """
+    wanted = 0.5 - np.abs(systems[:, W]) * systems[:, LAM] / gamma**2
+    wanted[systems[:, C_T] != 0.0] = 0.0
+    low, high = np.zeros(len(gamma)), np.ones(len(gamma))
+    for _ in range(40):
+        r = 0.5 * (low + high)
+        tension = np.sqrt(
+            (systems[:, M_F] * r) ** 2 + (systems[:, C_F] * r * r) ** 2 + (systems[:, W_F] / gamma**2) ** 2
+        )
+        below = tension + 0.5 * r * r < wanted
+        low, high = np.where(below, r, low), np.where(below, high, r)
+    return low
 
 
 def _check_foreseen(a: Array, b: Array, least: Array, times: float = 1.0) -> None:
@@ -289,6 +331,27 @@ def _check_foreseen(a: Array, b: Array, least: Array, times: float = 1.0) -> Non
         f"shots with drag of about {steps / max(count, 1.0):,.0f} steps, some {float(f'{count:.2g}'):,.0f} of them",
         REMEDY,
     )
+
+
+def _to_split(a: Array, b: Array, new: Array, width: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which intervals, of values at their ends and in their middle, are to be halved once more, and which are flat."""
+    # By value and by slope: where the points are too few for what goes on between, one of them may agree by accident.
+    middle_slope = 1.5 * (b[:2] - a[:2]) / width - 0.25 * (a[2:4] + b[2:4])
+    wrong = np.hypot(*(_between(a, b, width, 0.5) - new[:2]))
+    wrong = np.maximum(wrong, SLOPE_SHARE * width * np.hypot(*(middle_slope - new[2:4])))
+    line = _between(a[..., None], b[..., None], width[:, None], LOOKS)
+    away = np.hypot(*line) - 1.0
+    nearest = np.abs(away).min(axis=1)
+    # Next to a cusp three roots are where the radius hardly changes: the points must tell its smallest waves.
+    level = np.abs(np.diff(away, axis=1)) * (len(LOOKS) - 1) < FLAT * width[:, None]
+    flat = (level & (np.abs(away[:, 1:]) < NEAR_FOLD)).any(axis=1)
+    tolerance = np.where(flat, PREDICTED_FLAT, PREDICTED)
+    # Far from the tow radius by more than twice what the cubic is wrong, or right. Beside a shot that failed nothing is
+    # known, and nothing gained by more of them.
+    split = (wrong > tolerance) & (nearest < np.maximum(2.0 * wrong, np.where(flat, NEAR_FOLD, 0.0)))
+    # The angle about the axis counts nodes: where it changes more, waves may hide between the points.
+    split |= np.maximum(np.abs(new[6] - a[6]), np.abs(new[6] - b[6])) > TURNED
+    return split, flat
 
 
 def _between(a: Array, b: Array, width: Array, t: float | Array) -> Array:

@@ -15,7 +15,7 @@ Integers = NDArray[np.int64]
 
 # Of a shot: with the usual patience, and with any. More are taken by cables that all but float, bare at their end, in
 # drag so strong that they trail along their circle.
-STEPS, MOST_STEPS = 10**5, 10**7
+STEPS, MOST_STEPS = 5 * 10**5, 10**7
 # Shots between two looks at the clock: at most, first and at least; about so many steps of them, some seconds. Where
 # nobody looks, so many, for at the end of each batch the longest shot leaves the other lanes idle.
 BATCH, FIRST_BATCH, LEAST_BATCH, STEPS_A_BATCH, UNWATCHED = 128, 32, 16, 4 * 10**6, 8192
@@ -67,6 +67,8 @@ def shoot(
     *,
     directions: Array | None = None,
     shares: ArrayLike = 1.0,
+    looseness: float = 1.0,
+    max_steps: int | None = None,
 ) -> Ends:
     """Shots from the fish to the tow point.
 
@@ -84,6 +86,10 @@ def shoot(
         How systems move with the parameter among the unknowns.
     shares : array_like, shape (shots,) or ()
         The part of the cable to shoot over, 0 to 1.
+    looseness : float
+        How much larger than rounding the error of a step may be, >= 1.
+    max_steps : int, optional
+        Of a shot, as far as patience goes by default.
 
     Returns
     -------
@@ -97,6 +103,7 @@ def shoot(
     """
     from towatlas.kernels.drag import RESULT_ROWS
     from towatlas.kernels.drag_shots import Algebra, Reached, Shots
+    from towatlas.kernels.steppers import TRUNCATION
     from towatlas.kernels.sweeps import shoot_drag_threads
 
     r = np.array(r, float, ndmin=1)
@@ -112,11 +119,13 @@ def shoot(
     turns, codes = np.empty((rows, 2), np.int64), np.empty(rows, np.int64)
     shots, algebra = Shots(r, np.square(speed), table, moved, part), Algebra(*jets.algebra)
     reached = Reached(state, steps, turns, codes)
-    begin, batch, max_steps = 0, FIRST_BATCH if limited() else UNWATCHED, scaled(STEPS, MOST_STEPS)
+    if max_steps is None:
+        max_steps = scaled(STEPS, MOST_STEPS)
+    begin, batch = 0, FIRST_BATCH if limited() else UNWATCHED
     while begin < rows:
         check_patience("shots with drag", REMEDY)
         stop = min(rows, begin + batch)
-        shoot_drag_threads(shots, algebra, max_steps, reached, begin, stop)
+        shoot_drag_threads(shots, algebra, TRUNCATION * looseness, max_steps, reached, begin, stop)
         if limited():
             batch = int(np.clip(STEPS_A_BATCH / max(1.0, steps[begin:stop].mean()), LEAST_BATCH, BATCH))
         begin = stop

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from towatlas.effort import check_patience
 from towatlas.report import frame
 from towatlas.report.frame import maths, number
+from towatlas.report.nrl7048 import lasting_page
 from towatlas.report.nrl7048.figures import (
     DRAWN_SEGMENTS,
     FIG_10,
@@ -33,6 +34,7 @@ from towatlas.report.nrl7048.figures import (
     plot_two_node_shapes,
     root_names,
 )
+from towatlas.report.nrl7048.photographs import DRAG, PHOTOGRAPHS, TOW_RADIUS, Photograph
 from towatlas.report.nrl7048.published import SEGMENTS, Comparison, compare
 from towatlas.report.nrl7048.text import BODY, CAPTIONS
 from towatlas.solve.critical import solve_critical
@@ -40,10 +42,6 @@ from towatlas.solve.equilibria import equilibria
 
 # Share of the height of a curve, about the width of a line, below which a reader sees no difference.
 VISIBLE = 0.005
-# Radius of the experiment [in].
-TOW_RADIUS = 11.0 / 16.0
-# Its drag constant, as the report gives it.
-DRAG = 0.018
 
 
 @dataclass(frozen=True)
@@ -92,39 +90,6 @@ FIGURES = (
 )
 
 
-@dataclass(frozen=True)
-class Photograph:
-    """One of the photographs of Figs. 3-5 for which the report states the number of nodes; all in air.
-
-    Attributes
-    ----------
-    figure : str
-        Its number and letter.
-    lam, w_f, gamma : float
-        Cable length, fish weight and speed [-].
-    nodes : int
-        As photographed, >= 1.
-    """
-
-    figure: str
-    lam: float
-    w_f: float
-    gamma: float
-    nodes: int
-
-
-PHOTOGRAPHS = (
-    Photograph("3a", 37.8, 1352.0, 1.64, 1),
-    Photograph("3b", 37.8, 1352.0, 2.97, 1),
-    Photograph("3c", 37.8, 1352.0, 5.94, 2),
-    Photograph("4a", 52.4, 1352.0, 2.46, 2),
-    Photograph("4c", 52.4, 1352.0, 4.77, 3),
-    Photograph("5a", 52.4, 1571.0, 2.60, 2),
-    Photograph("5b", 52.4, 1571.0, 4.77, 2),
-    Photograph("5c", 52.4, 1571.0, 7.23, 3),
-)
-
-
 @cache
 def expected_nodes(*, lam: float, w_f: float, gamma: float, C: float = 0.0) -> int:
     """Nodes of the equilibrium that is expected, in a vacuum or with drag.
@@ -167,6 +132,7 @@ def report_page() -> str:
         models="".join(f'<th scope="col" class="n">{title}</th>' for title, _ in MODELS),
         photographs="".join(_photograph_row(photograph) for photograph in PHOTOGRAPHS),
         failures=_failures(),
+        lasting=lasting_page.section(),
         lengths=" and ".join(f"{lam * TOW_RADIUS:.1f} in" for lam in sorted({p.lam for p in PHOTOGRAPHS})),
         drag=DRAG,
         segments=SEGMENTS,

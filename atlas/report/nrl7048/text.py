@@ -43,6 +43,8 @@ $verdict
 <ul>
 <li><a href="#numbers">The numbers</a></li>
 $contents<li><a href="#photographs">The photographs</a></li>
+<li><a href="#lasting">Which shapes last</a></li>
+<li><a href="#interpretation">The interpretation</a></li>
 </ul>
 </nav>
 
@@ -77,4 +79,62 @@ that of the equilibrium whose fish is nearest to the axis.</p>
 $photographs</tbody></table>
 <p>$failures</p>
 <p>The weights of the fish and the drag constant are recomputed <a href="#numbers">above</a>. The lengths of the cables
-are not printed; with the tow radius of 11/16 in the values of &lambda; give $lengths.</p>"""
+are not printed; with the tow radius of 11/16 in the values of &lambda; give $lengths.</p>
+$lasting"""
+
+# $ marks what `towatlas.report.nrl7048.lasting_page` fills in.
+LASTING = """
+<h2 id="lasting">Which shapes last</h2>
+<p>The report calls a stability analysis noteworthy as missing. Here it is: its Eqs. (12) and (15b) with time,
+linearised about a shape in the turning frame. A small motion grows as exp(growth <i>t</i>) and turns by frequency
+<i>t</i>, with <i>t</i> in &radic;(<i>R</i>/<i>g</i>); shown is the leading eigenvalue, a zero of the Evans function,
+and all that grow are counted. In air, <i>C</i> = $drag, it is that of the shape next to the axis, in a vacuum that of
+the median root. <i>Turns to e</i> are turns of the tow point in which a motion grows by a factor of e; <i>weak</i> is
+growth below 0.01 &gamma;.</p>
+$growth
+<p>$stable last. $unstable grow, and were photographed: $several of eight lie within windows of speed in which the
+shape next to the axis does not last. Inside or outside is decided by where the edge of a window is.</p>
+$figure
+<h3>Fig. 6</h3>
+<p>$fig6</p>
+<h3>The edges</h3>
+<p>The edge of a window that is nearest to each photograph, how far it is from the speed printed, by how much it moves
+with $change % more length, weight of the fish and drag, each computed anew, and the largest growth in that window.
+Growth was counted at speeds $spacing % apart at most: narrower windows may be missed.</p>
+$edges
+<p>That of Fig. 3c, at &gamma; = $edge, comes down to 5.94 with a line longer by $longer %. The centre of the sinker
+does hang below the knot: a lead ball of 14.132 g has a radius of $ball <i>R</i>.</p>
+<h3>What the model does not explain</h3>
+<p>Growth at the speeds of the photographs if the line was longer or the drag another; shaded where it is above
+0.01 &gamma;.</p>
+$changed
+$unexplained
+
+<h2 id="interpretation">The interpretation</h2>
+<p>In lieu of that analysis the report reads its solution curves in six steps, and it draws conclusions from experiment
+and theory. Here they are tried, in a vacuum where nothing else is said, on five cables and as many of their first three
+transitions as they have.</p>
+$claims"""
+
+GROWTH_CAPTION = """\
+Growth of the shape next to the axis in air, <i>C</i> = $drag, in factors of e in a turn of the tow point; shaded are
+windows in which it exceeds 0.01 &gamma; somewhere. Photographs are disks where the shape lasts, crosses where it does
+not; the cross at 3.9 is Fig. 6. Triangles: critical speeds of the vacuum, at which the median root changes."""
+
+FIG_6_WORDS = """\
+At &gamma; = $gamma the shape next to the axis is in a window of flutter, from $low to $high: it grows by $growth, a
+factor of e in $turns turns, with a frequency of $frequency. In air there is no fold: from &gamma; = $slowest to
+$fastest the cable has $count shapes at every speed, and the one next to the axis goes over from one node to two by
+itself, between &gamma; = $before and $after. In a vacuum the shapes with two nodes come into being at
+&gamma;<sub>c2</sub> = $c2, $below % below the speed of the figure, where the median root ($nodes nodes) grows by
+$vacuum. What the report takes for a jump from one shape to the next is, by its own equations, a shape that is there
+and does not last."""
+
+UNEXPLAINED = """\
+<p>$verdict</p>
+<ul>
+$items</ul>
+<p>Fig. 4c (&lambda; = $lam, <i>w</i><sub>f</sub> = $w_f, &gamma; = $gamma) is not explained: with the printed numbers
+its shape grows by $growth, with <i>C</i> = $drag it is $less, and with the longer line, which Fig. 3c needs, it grows
+by $more. It lies $above % above the edge at $edge; a longer line moves that edge down, and the photograph deeper into
+the window.</p>"""

@@ -1,0 +1,102 @@
+"""Where methods for growth rates fail: each test shows the usual way failing, and this program not.
+
+Aliased phases, too few panels and guesses that are none are in test_stability.py.
+"""
+
+import numpy as np
+import pytest
+from test_stability import AIR, galerkin, motion_of
+
+import towatlas
+from benchmarks.stability import CASES, reference
+from towatlas.solve.spectrum import polish, together
+
+# Largest |sigma| that the program looks at, over gamma.
+REACH = 4.0
+
+
+def secants(motion, guess, rounds=60):
+    """As they are in books: from a guess, to wherever they go."""
+    points, values = [guess * (1.0 + 1e-5), guess], []
+    for point in points:
+        value, log = motion.evans(np.array([point]))
+        values.append((value[0], log[0]))
+    for _ in range(rounds):
+        (before, log_before), (here, log) = values[-2:]
+        change = here - before * np.exp(log_before - log)
+        if change == 0.0:
+            break
+        points.append(points[-1] - here * (points[-1] - points[-2]) / change)
+        value, log = motion.evans(points[-1:])
+        values.append((value[0], log[0]))
+        if abs(points[-1] - points[-2]) < 1e-15:
+            break
+    return points[-1]
+
+
+@pytest.fixture(scope="module")
+def kink():
+    """A shape that passes the axis closely in air, and its leading growth rate to 17 digits, by another program."""
+    k = [case.name for case in CASES].index("kink")
+    return CASES[k].found, reference()[k]
+
+
+def test_the_kink_of_the_normal_flow(kink):
+    """|V_n| has a kink there: Galerkin's method, exponential without drag, becomes algebraic; the march does not."""
+    found, exact = kink
+    errors = [np.abs(galerkin(motion_of(found, found.expected), degree, 3.0) - exact).min() for degree in (6, 11, 14)]
+    assert min(errors) > 1e-9
+    assert errors[0] / errors[-1] < 1e3
+    vacuum = towatlas.equilibria(10.0, 1.0, 1.5)
+    leading = towatlas.stability_of(vacuum).eigenvalues[vacuum.expected][0] / vacuum.gamma
+    smooth = [np.abs(galerkin(motion_of(vacuum, vacuum.expected), degree, 3.0) - leading).min() for degree in (6, 11)]
+    assert smooth[1] < 1e-12
+    ours = towatlas.stability_of(found).eigenvalues[found.expected][0] / found.gamma
+    assert abs(ours - exact) < 1e-14
+
+
+def test_high_modes_of_galerkin_are_false(kink):
+    """Short panels carry waves of their own: hardly damped, of frequencies that move with the degree by more than
+    their distance. Of what the program says none is there."""
+    found, _ = kink
+    motion = motion_of(found, found.expected)
+    few, more = (galerkin(motion, degree, 3.0) for degree in (8, 11))
+    high = few[(few.imag > 50.0) & (np.abs(few.real) < 1e-2 * np.abs(few))]
+    assert len(high) > 20
+    assert np.median(np.abs(high[:, None] - more).min(axis=1)) > 1e-2
+    ours = towatlas.stability_of(found).eigenvalues[found.expected] / found.gamma
+    assert np.abs(ours).max() < REACH
+    assert max(np.abs(more - sigma).min() for sigma in ours) < 1e-4
+
+
+def test_secants_end_at_another_zero():
+    """At one that damps, past the flutter that the guess is nearest to; the program gives the guess up."""
+    found = towatlas.equilibria(37.8, 1352.0, 5.94, **AIR)
+    motion = motion_of(found, 1)
+    zeros = towatlas.stability_of(found).eigenvalues[1] / found.gamma
+    guess = 0.05 + 0.25j
+    nearest = zeros[np.argmin(np.abs(zeros - guess))]
+    assert nearest == pytest.approx(0.0256262447 + 0.4312885550j, abs=1e-9)
+    reached = secants(motion, guess)
+    assert abs(motion.evans(np.array([reached]))[0][0]) < 1e-10
+    assert abs(reached - nearest) > 0.1
+    assert reached.real < 0.0 < nearest.real
+    _, good = polish(motion, np.array([guess]), np.concatenate([zeros, zeros.conj()]))
+    assert not good[0]
+
+
+def test_secants_at_a_double_root():
+    """Half the digits, and other ones from another guess; the middle of the two zeros keeps all of them."""
+    found = towatlas.equilibria(37.8, 1352.0, 3.643306226987)
+    motion = motion_of(found, found.expected)
+    near = together(motion, towatlas.stability_of(found).eigenvalues[found.expected][0] / found.gamma, 0.1).sigma
+    centre = 1j * near[np.argsort(np.abs(near - near[0]))[:2]].mean().imag
+    ends = [secants(motion, centre + away) for away in (0.01, 0.01j, -0.007j)]
+    assert max(abs(end - ends[0]) for end in ends) > 1e-8
+    middles = []
+    for radius in (0.1, 0.08):
+        both = together(motion, centre, radius).sigma
+        pair = both[np.argsort(np.abs(both - centre))[:2]]
+        assert abs(pair[0] - pair[1]) < 1e-4
+        middles.append(pair.mean())
+    assert abs(middles[0] - middles[1]) < 1e-12
