@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from towatlas.effort import TooMuchWork, patience
     from towatlas.limits import excess_length, massless_cable, threshold_length
     from towatlas.results import CriticalStates, Cusps, DragFolds, Equilibria, FishPositions, Folds
-    from towatlas.results_motion import Branch, Diagram, Flutter, Stability, Window
+    from towatlas.results_motion import Boundary, Branch, Diagram, Flutter, Stability, Window
     from towatlas.scene.designs import design
     from towatlas.scene.file import read_scene
     from towatlas.scene.jumps import answer_scene
@@ -21,11 +21,13 @@ if TYPE_CHECKING:
     from towatlas.solve.drag_folds import solve_drag_folds
     from towatlas.solve.equilibria import equilibria
     from towatlas.solve.flutter import flutter
+    from towatlas.solve.flutter_boundaries import krein_boundaries
     from towatlas.solve.folds import folds
     from towatlas.solve.many import equilibria_many
     from towatlas.solve.proof.certificates import Certificate, certify
     from towatlas.solve.proof.states import CertifiedEquilibria, certify_equilibria
     from towatlas.solve.shapes import shape, shape_of
+    from towatlas.solve.spectra import stability_many
     from towatlas.solve.stability import stability, stability_of
     from towatlas.system import System
     from towatlas.tables.atlas import Atlas, open_atlas
@@ -35,6 +37,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Atlas",
     "AtlasFileError",
+    "Boundary",
     "Branch",
     "Certificate",
     "CertifiedEquilibria",
@@ -61,6 +64,7 @@ __all__ = [
     "excess_length",
     "flutter",
     "folds",
+    "krein_boundaries",
     "massless_cable",
     "open_atlas",
     "patience",
@@ -70,6 +74,7 @@ __all__ = [
     "solve_critical",
     "solve_drag_folds",
     "stability",
+    "stability_many",
     "stability_of",
     "sweep",
     "threshold_length",
@@ -80,7 +85,7 @@ _HOMES = {
     "effort": ("TooMuchWork", "patience"),
     "limits": ("excess_length", "massless_cable", "threshold_length"),
     "results": ("CriticalStates", "Cusps", "DragFolds", "Equilibria", "FishPositions", "Folds"),
-    "results_motion": ("Branch", "Diagram", "Flutter", "Stability", "Window"),
+    "results_motion": ("Boundary", "Branch", "Diagram", "Flutter", "Stability", "Window"),
     "scene.designs": ("design",),
     "scene.file": ("read_scene",),
     "scene.jumps": ("answer_scene",),
@@ -91,11 +96,13 @@ _HOMES = {
     "solve.drag_folds": ("solve_drag_folds",),
     "solve.equilibria": ("equilibria",),
     "solve.flutter": ("flutter",),
+    "solve.flutter_boundaries": ("krein_boundaries",),
     "solve.folds": ("folds",),
     "solve.many": ("equilibria_many",),
     "solve.proof.certificates": ("Certificate", "certify"),
     "solve.proof.states": ("CertifiedEquilibria", "certify_equilibria"),
     "solve.shapes": ("shape", "shape_of"),
+    "solve.spectra": ("stability_many",),
     "solve.stability": ("stability", "stability_of"),
     "system": ("System",),
     "tables.atlas": ("Atlas", "open_atlas"),

@@ -140,6 +140,43 @@ class Flutter:
 
 
 @dataclass(frozen=True)
+class Boundary:
+    """Where the inner member of the n-th pair in a vacuum begins or ceases to flutter, as a curve over the length.
+
+    Attributes
+    ----------
+    n : int
+        Of the pair, >= 1.
+    w_f : float
+        Fish weight over (mu + rho A) g R [-], >= 0.
+    lam, gamma : ndarray, shape (points,)
+        Length over tow radius and speed Omega sqrt(R/g) along the curve [-]; its ends and its turning points in lam,
+        all solved for, are among them.
+    omega : ndarray, shape (points,)
+        Frequency of the two oscillations that meet, over Omega [-], >= 0.
+    r_f : ndarray, shape (points,)
+        Distance of the fish from the axis over tow radius [-], > 0.
+    turns : ndarray of int
+        Which of the points are turning points: where two edges meet, in a cusp where three oscillations are one.
+    error : ndarray, shape (points,)
+        Estimated relative error of gamma, across the curve [-].
+    kinds : (str, str)
+        What is at its ends: "length" or "speed", the limits of what was looked at, "fold" of the statics, "real",
+        where growth rates meet on the real axis instead, or "unknown".
+    """
+
+    n: int
+    w_f: float
+    lam: Array
+    gamma: Array
+    omega: Array
+    r_f: Array
+    turns: Integers
+    error: Array
+    kinds: tuple[str, str]
+
+
+@dataclass(frozen=True)
 class Point:
     """Where a branch begins, ends or changes.
 

@@ -26,9 +26,16 @@ SLOPE, FOLD = jets_of(1), jets_of(2, gamma=True, parameter=True)
 STEPS = 1000
 
 
-def measure(many: int = 2000, grid: tuple[int, int] = (50, 40), shots: int = 2000, full: bool = True) -> list[Target]:
+def measure(
+    many: int = 2000,
+    grid: tuple[int, int] = (50, 40),
+    shots: int = 2000,
+    full: bool = True,
+    growth: tuple[int, int] = (6, 40),
+) -> list[Target]:
     """All of them; processes only where `full`."""
     found = [*_random_systems(many), _grid(*grid), *_shots(shots)]
+    found += _growth(*growth)
     return found + (_processes() if full else [])
 
 
@@ -84,6 +91,32 @@ def _grid(speeds: int, drags: int) -> Target:
         f"lam 20, w_f 10; {int(found[0]['count'].min())} to {int(found[0]['count'].max())} shapes"
     )
     return _allowed("systems of a grid, 10 CPU minutes for 100,000", 600.0 / MANY, used, note)
+
+
+def _growth(cables: int, speeds: int) -> list[Target]:
+    """Growth rates of the shapes of neighbours: a few cables, each at speeds half a percent apart."""
+    lam, gamma = np.linspace(35.0, 40.0, cables)[:, None], 4.0 * 1.005 ** np.arange(speeds)
+    found = []
+    for name, c in (("in a vacuum", 0.0), ("in air, C 0.018", 0.018)):
+        towatlas.stability_many(lam[:1], 1352.0, gamma[:2], C=c)
+        many = []
+        used = _cpu(lambda c=c, many=many: many.append(towatlas.stability_many(lam, 1352.0, gamma, C=c)))
+        shapes = int(many[0]["count"].sum())
+        worst = 0.0
+        for k in range(0, speeds, max(1, speeds // 4)):
+            row = many[0].isel(system_0=0, system_1=k)
+            one = towatlas.stability(float(lam[0, 0]), 1352.0, float(gamma[k]), C=c)
+            leading = one.growth + 1j * one.frequency
+            near = [int(np.nanargmin(np.abs(row.r_f.values / r_f - 1.0))) for r_f in one.equilibria.r_f]
+            ours = row.growth.values[near] + 1j * row.frequency.values[near]
+            worst = max(worst, float(np.nanmax(np.abs(ours - leading)) / gamma[k]))
+        note = (
+            f"{used / shapes * MANY / 60:.1f} CPU minutes from {shapes} shapes, lam 35 to 40, w_f 1352, gamma 4 on; "
+            f"within {worst:.0e} gamma of one by one"
+        )
+        allowed = 600.0 / MANY
+        found.append(_allowed(f"growth rates of neighbours {name}, shapes included", allowed, used / shapes, note))
+    return found
 
 
 def _shots(rows: int) -> list[Target]:

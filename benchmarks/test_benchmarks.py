@@ -166,7 +166,7 @@ def test_a_bare_tip_of_the_peers_is_ours():
 
 
 def test_targets_with_drag():
-    assert all(target.value > 0.0 for target in targets_drag.measure(8, (2, 2), 16, full=False))
+    assert all(target.value > 0.0 for target in targets_drag.measure(8, (2, 2), 16, full=False, growth=(1, 3)))
 
 
 def test_growth_rates(tmp_path):

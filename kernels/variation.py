@@ -24,6 +24,7 @@ nowhere else. It is an entire function, real on the real axis.
 
 from typing import Any
 
+import numba
 import numpy as np
 
 from towatlas.kernels import status
@@ -203,7 +204,7 @@ def _shorten(c, p, h, lane, reach, bound):
 
 @kernel
 def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, statuses, begin, stop):
-    """Series of the coefficients along the shapes begin..stop-1, for |sigma| <= reach; up to eight side by side.
+    """Series of the coefficients along the shapes begin..stop-1, for |sigma| <= reach of each, eight side by side.
 
     series : shape (rows, most steps, ROWS, TERMS), in the part of a step; sizes : shape (rows, most steps), of the
     steps in tau; starts : shape (rows, 3), the length of a bare tip that is left out, whether it is bare, and the
@@ -241,7 +242,7 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
             step_lengths(c, p, count, TRUNCATION, room, h)
             for lane in range(LANES):
                 if jobs[lane] != IDLE:
-                    h[lane] = _shorten(c, p, h[lane], lane, reach, bound)
+                    h[lane] = _shorten(c, p, h[lane], lane, reach[jobs[lane]], bound)
             store(room, TWO, values(c, U * KEPT, FIRST, load(h, ZERO)))
             for lane in range(LANES):
                 ended[lane] = False
@@ -313,10 +314,9 @@ def _turn(eta, zeta, place, real, imaginary):
 
 
 @helper
-def _march_step(series, size, drag, eta, phi, zeta, alpha, real, imaginary, out):
-    """One step of the solutions in the lanes; eta, phi at order 0 to `out`, shape of 12 places. The largest of the
-    last terms over the solution."""
-    for k in range(TERMS):
+def _march_step(series, size, drag, terms, eta, phi, zeta, alpha, real, imaginary, out):
+    """One step of the solutions in the lanes, with so many terms; eta, phi at order 0 to `out`, shape of 12 places."""
+    for k in range(terms):
         at, ahead = k * SIX, (k + 1) * SIX
         _turn(eta, zeta, at, real, imaginary)
         _turn(zeta, alpha, at, real, imaginary)
@@ -347,7 +347,7 @@ def _march_step(series, size, drag, eta, phi, zeta, alpha, real, imaginary, out)
             store(phi, ahead + 4 + part, f2 * share)
     for i in range(SIX):
         u = v = broadcast(0.0)
-        for k in range(TERMS, -1, -1):
+        for k in range(terms, -1, -1):
             u = u + load(eta, k * SIX + i)
             v = v + load(phi, k * SIX + i)
         store(out, i, u)
@@ -451,37 +451,56 @@ def _begin_solutions(series, start, fish, sigma, first, eta, phi, room):
 
 
 @kernel
-def evans(series, sizes, start, steps, fish, drag, sigma, values_of, logs):
-    """D at each of `sigma`, shape (points,), as values_of exp(logs), for one shape, two at a time."""
-    points = len(sigma)
+def evans(series, sizes, first, steps, starts, fish, drag, terms, every, shape, sigma, values_of, logs, begin, stop):
+    """D at each of the `sigma` begin..stop-1, shape (points,), as values_of exp(logs), two of one shape at a time.
+
+    series, sizes : of all steps of all shapes; first, steps : where those of each begin, and how many there are.
+    starts, fish, drag : by shapes; shape : of each point, those of one shape next to each other.
+    terms : of the series, up to TERMS; solutions are made orthonormal after `every` so many steps.
+    """
     eta, phi = aligned((TERMS + 1) * SIX), aligned((TERMS + 1) * SIX)
     zeta, alpha, out = aligned((TERMS + 1) * SIX), aligned((TERMS + 1) * SIX), aligned(2 * SIX)
     parts, z, room = aligned(2), np.zeros((6, 3), np.complex128), np.zeros((2, 3, 3))
-    for begin in range(0, points, 2):
-        count = min(2, points - begin)
+    at = begin
+    while at < stop:
+        i = shape[at]
+        count = 2 if at + 1 < stop and shape[at + 1] == i else 1
         for which in range(2):
-            at = begin + min(which, count - 1)
-            _begin_solutions(series[0], start, fish, sigma[at], 3 * which, eta, phi, room)
-            logs[at] = 0.0
+            point = at + min(which, count - 1)
+            _begin_solutions(series[first[i]], starts[i], fish[i], sigma[point], 3 * which, eta, phi, room)
+            logs[point] = 0.0
             for column in range(3):
-                parts[3 * which + column] = sigma[at].real
-                parts[LANES + 3 * which + column] = sigma[at].imag
+                parts[3 * which + column] = sigma[point].real
+                parts[LANES + 3 * which + column] = sigma[point].imag
         real, imaginary = load(parts, ZERO), load(parts, FIRST)
-        for step in range(steps):
-            _march_step(series[step], sizes[step], drag, eta, phi, zeta, alpha, real, imaginary, out)
+        for step in range(steps[i]):
+            here = first[i] + step
+            _march_step(series[here], sizes[here], drag[i], terms, eta, phi, zeta, alpha, real, imaginary, out)
+            last = step == steps[i] - 1
+            if not last and (step + 1) % every != 0:
+                for place in range(SIX):
+                    store(eta, place, load(out, place))
+                    store(phi, place, load(out, SIX + place))
+                continue
             for which in range(count):
                 # That of a wave of this frequency.
-                weight = 1.0 / (np.sqrt(series[step, 0, 0]) * (1.0 + abs(sigma[begin + which])))
-                logs[begin + which] += _orthonormalise(out, 3 * which, weight, z)
-                if step == steps - 1:
-                    values_of[begin + which] = _determinant(z)
+                weight = 1.0 / (np.sqrt(series[here, 0, 0]) * (1.0 + abs(sigma[at + which])))
+                logs[at + which] += _orthonormalise(out, 3 * which, weight, z)
+                if last:
+                    values_of[at + which] = _determinant(z)
                 for column in range(3):
-                    for i in range(3):
+                    for j in range(3):
                         for half in range(2):
-                            place = 2 * i * LANES + 3 * which + column
+                            place = 2 * j * LANES + 3 * which + column
                             factor = 1.0 if half == 0 else 1.0 / weight
-                            value = factor * z[3 * half + i, column]
+                            value = factor * z[3 * half + j, column]
                             if half == 0:
                                 eta[place], eta[place + LANES] = value.real, value.imag
                             else:
                                 phi[place], phi[place + LANES] = value.real, value.imag
+        at += count
+
+
+def threads() -> int:
+    """How many threads kernels are called from."""
+    return int(numba.get_num_threads())

@@ -11,7 +11,8 @@ from towatlas.kernels import status
 from towatlas.solve.galerkin import matrices, modes
 from towatlas.solve.growth import reach_of
 from towatlas.solve.motion import motions
-from towatlas.solve.spectrum import count_growing, polish, together
+from towatlas.solve.spectrum import polish, together
+from towatlas.solve.winding import count_growing
 
 AIR = {"C": 0.018}
 WATER = {"C": 50.0, "w": 0.55, "m_f": 0.3, "C_f": 0.5, "C_t": 1.0}

@@ -10,6 +10,7 @@ from towatlas.tables.atlas import open_atlas
 FIGURES = {
     "critical": "critical speeds against cable length, from an atlas",
     "drag": "how drag closes the jumps, solved",
+    "stability": "where the shape with one node appears and flutters in a vacuum, solved; takes a minute",
     "device": "the tightest turns of lateral force devices, solved",
 }
 ELSEWHERE = {
@@ -50,6 +51,14 @@ def _run(options: argparse.Namespace) -> int:
         from towatlas.plot.drag_folds import plot_drag_folds
 
         plot_drag_folds(ax=axes)
+        save_figure(figure, options.out)
+        return OK
+    if options.figure == "stability":
+        figure, axes = new_figure(7.2, 7.0)
+        figure.clear()
+        from towatlas.plot.boundaries import plot_boundaries
+
+        plot_boundaries(axes=list(figure.subplots(2, 2).ravel()))
         save_figure(figure, options.out)
         return OK
     if options.figure == "device":

@@ -7,7 +7,8 @@ from towatlas.effort import check_patience
 from towatlas.kernels import status
 from towatlas.solve.galerkin import Modes, modes
 from towatlas.solve.motion import Array, Complex, Motion, motions
-from towatlas.solve.spectrum import Roots, count_growing, zeros_near
+from towatlas.solve.spectrum import Roots, zeros_near
+from towatlas.solve.winding import count_growing
 from towatlas.system import System
 
 # |sigma| looked at, in units of Omega, without drag, where nothing beyond 1 grows, and with it; the latter rises by so
@@ -41,7 +42,51 @@ def reach_of(system: System, gamma: float) -> float:
     float
         In units of Omega.
     """
-    return REACH + HANGING / (abs(gamma) * np.sqrt(system.lam)) if has_drag(system) else REACH_CONSERVED
+    drag = np.array([has_drag(system)])
+    return float(reach_at(lam=np.array([system.lam]), gamma=np.array([gamma]), drag=drag)[0])
+
+
+def reach_at(*, lam: Array, gamma: Array, drag: NDArray[np.bool_]) -> Array:
+    """The same of many shapes.
+
+    Parameters
+    ----------
+    lam, gamma : ndarray, shape (shapes,)
+        Lengths and speeds [-].
+    drag : ndarray of bool, shape (shapes,)
+        Whether the fluid does work.
+
+    Returns
+    -------
+    ndarray, shape (shapes,)
+    """
+    return np.where(drag, REACH + HANGING / (np.abs(gamma) * np.sqrt(lam)), REACH_CONSERVED)
+
+
+def kind_of(unstable: int, leading: complex, error: float) -> str:
+    """What a shape is, as of `towatlas.results_motion.Stability`.
+
+    Parameters
+    ----------
+    unstable : int
+        How many growth rates grow; -1 if not counted.
+    leading : complex
+        The leading one, in units of Omega.
+    error : float
+        Its error.
+
+    Returns
+    -------
+    str
+    """
+    if unstable == 0:
+        return "stable"
+    # What was found to grow does so, whether all that grow were counted or not.
+    if not leading.real > max(STILL, error):
+        return "unknown"
+    if leading.real < WEAK:
+        return "weak"
+    return "divergence" if leading.imag == 0.0 else "flutter"
 
 
 def has_drag(system: System) -> bool:
@@ -70,6 +115,8 @@ class Spectrum:
         Distance of the fish from the axis over tow radius [-], > 0.
     index : int
         In a vacuum the number of directions in which the energy falls; -1 if not known.
+    motion : Motion, optional
+        That of the shape, for sigma up to `reach_of`, where it is known.
 
     Attributes
     ----------
@@ -81,21 +128,27 @@ class Spectrum:
         Without drag as above.
     status : int
         A code of `towatlas.kernels.status`.
+    guesses : Modes or None
+        The last of Galerkin's method.
+    reach : float
+        As of `reach_of`.
     """
 
-    def __init__(self, system: System, gamma: float, r_f: float, index: int = -1):
+    def __init__(self, system: System, gamma: float, r_f: float, index: int = -1, motion: Motion | None = None):
         self.drag = has_drag(system)
         self.index = index
         self.roots = Roots(np.empty(0, np.complex128), np.empty(0))
         self.unstable = -1
+        self.guesses: Modes | None = None
+        self.reach = reach_of(system, gamma)
         self.motion = lambda reach: motions(np.array([r_f]), np.array([gamma]), system.row()[None], reach)[0]
-        motion = self.motion(reach_of(system, gamma))
+        motion = motion or self.motion(self.reach)
         self.status = motion.status
         if motion.status != status.OK:
             return
         for refined in range(REFINEMENTS):
             check_patience("growth rates", REMEDY)
-            guesses = modes(motion, refined)
+            guesses = self.guesses = modes(motion, refined)
             if self._counted(motion, guesses):
                 self.status = status.OK
                 return
@@ -116,15 +169,8 @@ class Spectrum:
     @property
     def kind(self) -> str:
         """As of `towatlas.results.Stability`."""
-        if self.unstable == 0:
-            return "stable"
-        # What was found to grow does so, whether all that grow were counted or not.
-        leading = self.roots.sigma[0] if len(self.roots) else 0.0
-        if not leading.real > max(STILL, self.roots.error[0] if len(self.roots) else 0.0):
-            return "unknown"
-        if leading.real < WEAK:
-            return "weak"
-        return "divergence" if leading.imag == 0.0 else "flutter"
+        leading = complex(self.roots.sigma[0]) if len(self.roots) else 0j
+        return kind_of(self.unstable, leading, float(self.roots.error[0]) if len(self.roots) else 0.0)
 
     def _slowest(self, motion: Motion, guesses: Modes) -> Roots:
         """Where nothing grows: the slowest mode."""

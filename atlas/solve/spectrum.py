@@ -1,12 +1,17 @@
-"""Growth rates of small motions as zeros of the Evans function, and a count of those that grow."""
+"""Growth rates of small motions as zeros of the Evans function."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.solve.galerkin import Modes
-from towatlas.solve.motion import Array, Complex, Motion
+from towatlas.solve.motion import Array, Complex, Integers, Motion
+
+# Values at points, of so many guesses.
+Function = Callable[[Integers, Complex], Complex]
 
 EPS = 2.0**-52
 ROUNDS = 12
@@ -17,11 +22,9 @@ FAR, OF_THE_WAY = 0.1, 0.4
 CLOSE, CIRCLE = 0.02, 32
 # Of the zeros of a series on that circle, those within this part of it are right.
 INSIDE = 0.6
-# First difference of secants.
-FIRST_STEP = 1e-5
-# Points of the contour at first, on the arc and on the axis, and at most in all; from one to the next the logarithm of
-# what is left of D may change by no more than this.
-POINTS, MOST_POINTS, LARGEST_CHANGE = 8, 4000, 0.8
+# First difference of secants, over sigma; errors over 1 + |sigma| that are left, with the rough Evans function and the
+# full one.
+FIRST_STEP, ROUGH, FINE = 1e-4, 1e-5, 32.0 * EPS
 # A determinant of solutions of unit length is known to rounding, times this a step.
 NOISE = 4.0
 
@@ -45,6 +48,111 @@ class Roots:
         return len(self.sigma)
 
 
+@dataclass(frozen=True)
+class Secants:
+    """Where secants came to.
+
+    Attributes
+    ----------
+    sigma : ndarray of complex, shape (guesses,)
+        The last points.
+    error : ndarray, shape (guesses,)
+        Their distance from a zero, as the last two steps foretell it.
+    slope : ndarray of complex, shape (guesses,)
+        Of the function there.
+    settled : ndarray of bool, shape (guesses,)
+        Whether they stopped because that is small, and no farther from the guess than there was room.
+    """
+
+    sigma: Complex
+    error: Array
+    slope: Complex
+    settled: NDArray[np.bool_]
+
+
+def secants(
+    function: Function,
+    guesses: Complex,
+    room: Array,
+    small: float,
+    slope: Complex | None = None,
+    line: Complex | None = None,
+) -> Secants:
+    """Zeros of a function next to guesses, all of them side by side.
+
+    Parameters
+    ----------
+    function : callable
+        Of numbers of guesses and of points, which gives values there.
+    guesses : ndarray of complex, shape (guesses,)
+    room : ndarray, shape (guesses,)
+        How far each may go, > 0: a part of the way to its neighbours.
+    small : float
+        An error over 1 + |sigma| that is small enough, > 0.
+    slope : ndarray of complex, shape (guesses,), optional
+        About that of the function, nan where not known.
+    line : ndarray of complex, shape (guesses,), optional
+        Directions of the lines that zeros lie on, 0 where on none.
+
+    Returns
+    -------
+    Secants
+    """
+    new, error = guesses.copy(), np.full(len(guesses), np.inf)
+    value = function(np.arange(len(new)), new)
+    slope = np.full(len(new), np.nan + 0j) if slope is None else slope.copy()
+    # What the slope is taken from is so far away.
+    apart = room.copy()
+    unknown = np.flatnonzero(np.isnan(slope))
+    if len(unknown):
+        step = FIRST_STEP * np.where(guesses[unknown] == 0.0, 1.0, guesses[unknown])
+        slope[unknown] = (function(unknown, new[unknown] + step) - value[unknown]) / step
+        apart[unknown] = np.abs(step)
+    moving = np.arange(len(new))
+    for _ in range(ROUNDS):
+        with np.errstate(all="ignore"):
+            change = np.where(value[moving] == 0.0, 0.0, -value[moving] / slope[moving])
+        if line is not None:
+            on = line[moving]
+            change = np.where(on == 0.0, change, on * (change * on.conj()).real)
+        sound = np.isfinite(change)
+        moving, change = moving[sound], change[sound]
+        new[moving] += change
+        # Errors of secants multiply; those of their first slope are those of the point it is from.
+        error[moving] = 4.0 * np.abs(change) * np.minimum(1.0, np.maximum(apart[moving], np.abs(change)) / room[moving])
+        goes_on = (error[moving] > small * (1.0 + np.abs(new[moving]))) & (
+            np.abs(new[moving] - guesses[moving]) <= room[moving]
+        )
+        moving, change = moving[goes_on], change[goes_on]
+        if not len(moving):
+            break
+        before = value[moving]
+        value[moving] = function(moving, new[moving])
+        slope[moving] = (value[moving] - before) / change
+        apart[moving] = np.abs(change)
+    settled = (error <= small * (1.0 + np.abs(new))) & (np.abs(new - guesses) <= room)
+    return Secants(new, error, slope, settled)
+
+
+def room_of(guesses: Complex, others: Complex) -> Array:
+    """How far guesses may be from their zeros.
+
+    Parameters
+    ----------
+    guesses : ndarray of complex, shape (guesses,)
+    others : ndarray of complex, shape (modes,)
+        All guesses.
+
+    Returns
+    -------
+    ndarray, shape (guesses,)
+        In units of Omega.
+    """
+    apart = np.abs(guesses[:, None] - others)
+    nearest = np.where(apart > 0.0, apart, np.inf).min(axis=1, initial=np.inf)
+    return np.minimum(FAR * (1.0 + np.abs(guesses)), OF_THE_WAY * nearest)
+
+
 def polish(motion: Motion, guesses: Complex, others: Complex) -> tuple[Roots, NDArray[np.bool_]]:
     """Zeros of the Evans function next to guesses, by secants, all of them side by side.
 
@@ -64,39 +172,23 @@ def polish(motion: Motion, guesses: Complex, others: Complex) -> tuple[Roots, ND
     """
     if not len(guesses):
         return Roots(guesses, np.empty(0)), np.empty(0, np.bool_)
-    apart = np.abs(guesses[:, None] - others)
-    room = np.minimum(
-        FAR * (1.0 + np.abs(guesses)), OF_THE_WAY * np.where(apart > 0.0, apart, np.inf).min(axis=1, initial=np.inf)
-    )
-    old, new = guesses * (1.0 + FIRST_STEP), guesses.copy()
-    values, logs = motion.evans(np.concatenate([old, new]))
-    value_old, log_old = values[: len(old)], logs[: len(old)]
-    value, log = values[len(old) :], logs[len(old) :]
-    slope = np.ones(len(new), np.complex128)
-    step = np.full(len(new), np.inf)
-    for _ in range(ROUNDS):
-        moving = (step > 4.0 * EPS * np.abs(new)) & (np.abs(new - guesses) <= room) & (value != 0.0)
-        if not moving.any():
-            break
-        difference = new - old
-        with np.errstate(all="ignore"):
-            rate = (value - value_old * np.exp(log_old - log)) / difference
-            change = -value / rate
-        # The last difference that tells a slope from rounding.
-        slope = np.where(moving & (np.abs(difference) > 0.01 * FIRST_STEP), rate, slope)
-        change = np.where(moving & np.isfinite(change), change, 0.0)
-        old, value_old, log_old = np.where(moving, new, old), value, log
-        new = new + change
-        step = np.where(moving, np.abs(change), step)
-        at, scales = motion.evans(new[moving])
-        value, log = value.copy(), log.copy()
-        value[moving], log[moving] = at, scales
-    settled = (step <= 64.0 * EPS * np.maximum(1.0, np.abs(new))) | (value == 0.0)
-    noise = NOISE * EPS * np.sqrt(len(motion.sizes)) / np.abs(slope)
-    return Roots(new, np.maximum(step, noise)), settled & (np.abs(new - guesses) <= room)
+    room, log = room_of(guesses, others), np.zeros(len(guesses))
+
+    def function(which: Integers, sigma: Complex, rough: bool) -> Complex:
+        values, logs = motion.evans(sigma, rough)
+        if not log.any():
+            log[:] = logs
+        return values * np.exp(logs - log[which])
+
+    near = secants(partial(function, rough=True), guesses, room, ROUGH)
+    near_guesses = np.where(near.settled, near.sigma, guesses)
+    slope = np.where(near.settled, near.slope, np.nan)
+    found = secants(partial(function, rough=False), near_guesses, room, FINE, slope)
+    noise = NOISE * EPS * np.sqrt(len(motion.sizes)) / np.abs(found.slope)
+    return Roots(found.sigma, np.maximum(found.error, noise)), found.settled & (np.abs(found.sigma - guesses) <= room)
 
 
-def together(motion: Motion, centre: complex, radius: float) -> Roots:
+def together(motion: Motion, centre: complex, radius: float, rough: bool = False) -> Roots:
     """All zeros in the inner part of a circle, from the Taylor series that values on it give: for those so close to
     each other that secants cannot tell them apart.
 
@@ -106,13 +198,15 @@ def together(motion: Motion, centre: complex, radius: float) -> Roots:
     centre : complex
     radius : float
         In units of Omega, > 0.
+    rough : bool
+        As of `Motion.evans`.
 
     Returns
     -------
     Roots
     """
     turn = np.exp(2j * np.pi * np.arange(CIRCLE) / CIRCLE)
-    values, logs = motion.evans(centre + radius * turn)
+    values, logs = motion.evans(centre + radius * turn, rough)
     series = np.fft.fft(values * np.exp(logs - logs.max())) / CIRCLE
     # The highest first; the upper half of the coefficients is rounding.
     series = series[CIRCLE // 2 :: -1]
@@ -122,7 +216,7 @@ def together(motion: Motion, centre: complex, radius: float) -> Roots:
     sigma = np.roots(series.real if complex(centre).imag == 0.0 else series)
     sigma = sigma[np.abs(sigma) < INSIDE]
     slopes, curves = (np.abs(np.polyval(np.polyder(series, order), sigma)) for order in (1, 2))
-    noise = NOISE * EPS * np.sqrt(len(motion.sizes)) * np.abs(series).max()
+    noise = (ROUGH if rough else NOISE * EPS * np.sqrt(len(motion.sizes))) * np.abs(series).max()
     # Of a double zero the square of the distance is known.
     error = radius * np.minimum(noise / np.maximum(slopes, 1e-300), np.sqrt(2.0 * noise / np.maximum(curves, 1e-300)))
     return Roots(centre + radius * sigma, error)
@@ -149,15 +243,43 @@ def zeros_near(motion: Motion, found: Modes, wanted: NDArray[np.bool_]) -> Roots
     roots, good = polish(motion, guesses[alone], mirrored)
     parts = [Roots(roots.sigma[good], roots.error[good])]
     again = [np.array([k]) for k in alone[~good]] + [group for group in groups if len(group) > 1]
-    for group in again:
-        centre = guesses[group].mean()
-        spread = np.abs(guesses[group] - centre).max()
-        if np.abs(centre.imag) < 2.0 * CLOSE:
-            centre = centre.real + 0j
-        some = together(motion, centre, 3.0 * spread + 2.0 * CLOSE)
-        upper = some.sigma.imag >= -some.error
-        parts.append(Roots(some.sigma[upper], some.error[upper]))
+    parts += [_around(motion, guesses[group]) for group in again]
     return _distinct(np.concatenate([p.sigma for p in parts]), np.concatenate([p.error for p in parts]))
+
+
+def _around(motion: Motion, guesses: Complex, rough: bool = False) -> Roots:
+    """Zeros around some guesses that are close to each other, in the upper half of the plane."""
+    centre = guesses.mean()
+    spread = np.abs(guesses - centre).max()
+    if np.abs(centre.imag) < 2.0 * CLOSE:
+        centre = centre.real + 0j
+    some = together(motion, centre, 3.0 * spread + 2.0 * CLOSE, rough)
+    upper = some.sigma.imag >= -some.error
+    return Roots(some.sigma[upper], some.error[upper])
+
+
+def rough_zeros(motion: Motion, guesses: Complex, settled: NDArray[np.bool_]) -> Complex:
+    """All zeros near guesses, those of the latter that did not settle from circles around them and what is close.
+
+    Parameters
+    ----------
+    motion : Motion
+    guesses : ndarray of complex, shape (guesses,)
+    settled : ndarray of bool, shape (guesses,)
+        Which of them are zeros.
+
+    Returns
+    -------
+    ndarray of complex, shape (zeros,)
+        In the upper half of the plane, those that had settled first.
+    """
+    found = [guesses[settled]]
+    for group in _groups(guesses, np.flatnonzero(~settled)):
+        new = _around(motion, guesses[group], rough=True)
+        sigma = np.where(np.abs(new.sigma.imag) <= new.error, new.sigma.real + 0j, new.sigma)
+        apart = np.abs(sigma[:, None] - np.concatenate(found)).min(axis=1, initial=np.inf)
+        found.append(sigma[apart > CLOSE / 20.0])
+    return np.concatenate(found)
 
 
 def _groups(guesses: Complex, wanted: NDArray[np.int64]) -> list[NDArray[np.int64]]:
@@ -188,67 +310,3 @@ def _distinct(sigma: Complex, error: Array) -> Roots:
             kept.append(int(k))
     order = sorted(kept, key=lambda k: (-sigma[k].real, abs(sigma[k].imag)))
     return Roots(sigma[order], error[order])
-
-
-def count_growing(motion: Motion, known: Complex) -> int | None:
-    """Zeros in the half disc |sigma| < reach, Re sigma > 0, by the argument principle.
-
-    Parameters
-    ----------
-    motion : Motion
-    known : ndarray of complex, shape (roots,)
-        Zeros in the upper half of the plane, those next to the contour accurate: D is divided by them, so that its
-        phase turns slowly.
-
-    Returns
-    -------
-    int or None
-        None where too many points would be needed, as where a zero lies on the contour that is not known.
-    """
-    R = motion.reach
-    zeros = np.concatenate([known, known[known.imag != 0.0].conj()])
-
-    def at(t: Array) -> Complex:
-        # From R along the arc to iR, then down to 0: the other half is its mirror image.
-        arc = R * np.exp(0.5j * np.pi * np.minimum(t, 1.0))
-        return np.where(t <= 1.0, arc, 1j * R * np.maximum(2.0 - t, 0.0))
-
-    def others(sigma: Complex) -> tuple[Complex, Array]:
-        """D over the factors of the zeros that are known: its phase, and the logarithm of its size."""
-        values, logs = motion.evans(sigma)
-        for zero in zeros:
-            away = sigma - zero
-            values = values / np.where(away == 0.0, 1.0, away)
-        size = np.abs(values)
-        return values / size, logs + np.log(size)
-
-    # What grows by a factor of e from one side of the disc to the other turns by a radian on its way around.
-    growth = float(np.ptp(others(np.array([-R, 0.0, R]))[1]))
-    each = POINTS + len(zeros) // 2 + int(min(growth / LARGEST_CHANGE, MOST_POINTS))
-    t = np.concatenate([np.linspace(0.0, 1.0, each, endpoint=False), np.linspace(1.0, 2.0, each)])
-    ends = np.stack([t[:-1], t[1:]])
-    phase, size = others(at(t))
-    phases, sizes = np.stack([phase[:-1], phase[1:]]), np.stack([size[:-1], size[1:]])
-    total, points = 0.0, len(t)
-    while ends.size:
-        points += ends.shape[1]
-        if points > MOST_POINTS:
-            return None
-        middle = ends.mean(axis=0)
-        phase, size = others(at(middle))
-        turns = np.angle(np.stack([phase / phases[0], phases[1] / phase]))
-        # Two zeros close beside the contour turn the phase by all but nothing between two points; the size, of one of
-        # the two halves at least, tells.
-        changes = np.hypot(turns, sizes - size)
-        good = changes.max(axis=0) < LARGEST_CHANGE
-        total += turns[:, good].sum()
-        halves = [np.stack([ends[0], middle]), np.stack([middle, ends[1]])]
-        phases = np.concatenate([np.stack([phases[0], phase]), np.stack([phase, phases[1]])], axis=1)
-        sizes = np.concatenate([np.stack([sizes[0], size]), np.stack([size, sizes[1]])], axis=1)
-        split = np.tile(~good, 2)
-        ends, phases, sizes = np.concatenate(halves, axis=1)[:, split], phases[:, split], sizes[:, split]
-    inside = (zeros.real > 0.0) & (np.abs(zeros) < R)
-    winding = total / np.pi
-    if abs(winding - np.round(winding)) > 0.1:
-        return None
-    return int(np.round(winding)) + int(inside.sum())

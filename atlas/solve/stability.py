@@ -11,6 +11,7 @@ from towatlas.results import Equilibria
 from towatlas.results_motion import Stability
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.growth import REMEDY, Spectrum, has_drag, reach_of
+from towatlas.solve.motion import Motion, motions
 from towatlas.system import System
 
 
@@ -103,9 +104,11 @@ def stability_of(found: Equilibria) -> Stability:
     codes = np.full(count, status.OK, np.int8)
     kinds, sigmas = ["unknown"] * count, [np.empty(0, np.complex128)] * count
     with patience():
+        reach = reach_of(system, found.gamma)
+        moved = motions(found.r_f, np.full(count, found.gamma), np.tile(system.row(), (count, 1)), reach)
         for k in range(count):
             check_patience("growth rates of the shapes", REMEDY, done=k, of=count)
-            answer = spectrum_of(found, k)
+            answer = spectrum_of(found, k, moved[k])
             codes[k], index[k] = answer.status, answer.index
             roots = answer.roots
             kinds[k] = answer.kind
@@ -129,7 +132,7 @@ def stability_of(found: Equilibria) -> Stability:
     )
 
 
-def spectrum_of(found: Equilibria, k: int) -> Spectrum:
+def spectrum_of(found: Equilibria, k: int, motion: Motion | None = None) -> Spectrum:
     """Growth rates of one of some equilibria.
 
     Parameters
@@ -137,6 +140,8 @@ def spectrum_of(found: Equilibria, k: int) -> Spectrum:
     found : Equilibria
     k : int
         Which.
+    motion : Motion, optional
+        Its linearised motion, where it is known.
 
     Returns
     -------
@@ -148,7 +153,7 @@ def spectrum_of(found: Equilibria, k: int) -> Spectrum:
         As `stability_of`.
     """
     energy = index_of(str(found.branch[k])) if found.system.in_vacuum else -1
-    return Spectrum(found.system, found.gamma, float(found.r_f[k]), energy)
+    return Spectrum(found.system, found.gamma, float(found.r_f[k]), energy, motion)
 
 
 def looked_at(found: Equilibria) -> str:

@@ -1,0 +1,260 @@
+"""Where inner shapes in a vacuum begin and cease to flutter: Krein collisions over the length of the cable.
+
+With sigma = i sqrt(s), D is real for real s, and even in sigma, so that it is smooth in s: two oscillations meet where
+D and its derivative in s are zero. Unknowns are the offset of the fish, the speed, the length and s; a curve ends at
+the limits of length and speed, at a fold of the statics, or at s = 0, beyond which growth rates are real.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from towatlas.kernels import status
+from towatlas.limits import unchecked_threshold_length
+from towatlas.numerics.curves import Curve, Steps, follow, tangents
+from towatlas.numerics.rows import solve_systems
+from towatlas.results_motion import Boundary
+from towatlas.solve.critical import solve_rows
+from towatlas.solve.jets import jets_of
+from towatlas.solve.motion import Array, Integers, Motions, motions
+from towatlas.solve.shots import shoot
+from towatlas.system import nondense_rows
+
+# log of the offset of the fish, of the speed, of the length beyond the threshold, and s.
+X, SPEED, EXCESS, S = range(4)
+UNKNOWNS = 4
+# Differences of the unknowns for slopes; circle of D around s, and points of its upper half.
+DIFFERENCE, RADIUS, HALF = 1e-5, 0.15, 9
+STEPS = Steps(first=0.01, longest=0.25, shortest=1e-6, near=1e-6, bent=0.3, easy=3, corrections=8, points=400)
+ROUNDS, LONGEST, SETTLED = 20, 0.2, 1e-11
+SLOPE = jets_of(1)
+
+
+@dataclass(frozen=True)
+class Domain:
+    """How far curves are followed.
+
+    Attributes
+    ----------
+    excess : (float, float)
+        Of lambda - lambda_cn [-], > 0.
+    speeds : float
+        The highest speed over gamma_cn [-], > 1.
+    """
+
+    excess: tuple[float, float] = (1e-2, 1e2)
+    speeds: float = 3.0
+
+
+class Collisions:
+    """Equations of Krein collisions, of rows of n and w_f."""
+
+    def __init__(self, n: Integers, w_f: Array, domain: Domain):
+        self.n, self.w_f, self.domain = n, w_f, domain
+        self.threshold = unchecked_threshold_length(w_f, n)
+
+    def systems(self, z: Array, rows: Integers) -> Array:
+        """As the kernels take them."""
+        lam = self.threshold[rows] + np.exp(z[:, EXCESS])
+        return nondense_rows(lam=lam, w_f=self.w_f[rows], C=np.zeros(len(rows)))
+
+    def values(self, z: Array, rows: Integers) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """How far points are from being collisions, shape (points, 3), slopes of the radius of the tow point along
+        shots, and whether they are sound."""
+        gamma, systems = np.exp(z[:, SPEED]), self.systems(z, rows)
+        r = np.exp(z[:, X])
+        ends = shoot(r, gamma, systems, SLOPE)
+        miss = np.log(np.hypot(ends.X[:, 0], ends.Y[:, 0])) - 2.0 * z[:, SPEED]
+        reach = 1.0 + np.sqrt(np.abs(z[:, S]) + RADIUS)
+        bodies = motions(r / gamma**2, gamma, systems, reach)
+        sound = (ends.status == status.OK) & np.array([body.status == status.OK for body in bodies])
+        turn = np.exp(1j * np.pi * np.arange(HALF) / (HALF - 1))
+        points = z[:, S, None] + RADIUS * turn
+        owner = np.repeat(np.arange(len(z)), HALF)
+        values, logs = Motions(bodies).evans(owner, 1j * np.sqrt(points.astype(complex)).ravel())
+        values, logs = values.reshape(points.shape), logs.reshape(points.shape)
+        values = values * np.exp(logs - logs.max(axis=1)[:, None])
+        circle = np.concatenate([values, values[:, -2:0:-1].conj()], axis=1)
+        series = np.fft.fft(circle, axis=1).real / circle.shape[1]
+        size = np.sqrt(np.square(series[:, :HALF]).sum(axis=1))
+        return np.stack([miss, series[:, 0] / size, series[:, 1] / size], axis=1), ends.log_rho[:, 1], sound
+
+    def __call__(self, z: Array, rows: Integers) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+        """As `towatlas.numerics.curves.Equations`."""
+        steps = np.concatenate([np.zeros((1, UNKNOWNS)), DIFFERENCE * np.eye(UNKNOWNS), -DIFFERENCE * np.eye(UNKNOWNS)])
+        every = (z[:, None] + steps).reshape(-1, UNKNOWNS)
+        values, slope, sound = self.values(every, np.repeat(rows, len(steps)))
+        values = values.reshape(len(z), len(steps), 3)
+        jacobian = (values[:, 1 : UNKNOWNS + 1] - values[:, UNKNOWNS + 1 :]) / (2.0 * DIFFERENCE)
+        slope = slope.reshape(len(z), -1)
+        sound = np.asarray(sound.reshape(len(z), -1).all(axis=1) & np.isfinite(values).all(axis=(1, 2)))
+        return values[:, 0], np.swapaxes(jacobian, 1, 2), self.limits(z, rows, slope[:, 0]), sound
+
+    def limits(self, z: Array, rows: Integers, slope: Array) -> Array:
+        """What is positive within the domain: of length, at both ends, speed, fold, and s."""
+        low, high = np.log(self.domain.excess)
+        excess = np.exp(z[:, EXCESS])
+        fold = solve_rows(lam=self.threshold[rows] + excess, w_f=self.w_f[rows], n=self.n[rows], excess=excess)["gamma"]
+        speed = np.log(self.domain.speeds * fold) - z[:, SPEED]
+        # Along shots of inner shapes the radius of the tow point rises.
+        return np.stack([z[:, EXCESS] - low, high - z[:, EXCESS], speed, slope, z[:, S]], axis=1)
+
+    def solve(self, z: Array, rows: Integers, fixed: int) -> tuple[Array, NDArray[np.bool_]]:
+        """Collisions near points, by Newton's method, with one of the limits fixed at zero, or where `fixed` is -1 the
+        length as it is; and which were found."""
+        z, good, length = z.copy(), np.zeros(len(z), bool), np.full(len(z), np.inf)
+        for _ in range(ROUNDS):
+            value, jacobian, limits, sound = self(z, rows)
+            last, gradient = np.zeros(len(z)), np.zeros((len(z), 1, UNKNOWNS))
+            if fixed < 0:
+                gradient[:, 0, EXCESS] = 1.0
+            else:
+                last = limits[:, fixed]
+                for k in range(UNKNOWNS):
+                    shift = DIFFERENCE * np.eye(UNKNOWNS)[k]
+                    ahead, behind = (self._limit(z + side * shift, rows, fixed) for side in (1.0, -1.0))
+                    gradient[:, 0, k] = (ahead - behind) / (2.0 * DIFFERENCE)
+            matrix = np.concatenate([jacobian, gradient], axis=1)
+            step = solve_systems(matrix, -np.concatenate([value, last[:, None]], axis=1))
+            length = np.linalg.norm(step, axis=1)
+            good = sound & np.isfinite(length)
+            step *= np.minimum(1.0, LONGEST / np.maximum(length, 1e-300))[:, None]
+            z[good] += step[good]
+            if ((length < SETTLED) | ~good).all():
+                break
+        return z, good & (length < 1e3 * SETTLED)
+
+    def _limit(self, z: Array, rows: Integers, fixed: int) -> Array:
+        slope = np.zeros(len(z))
+        if fixed == FOLD:
+            ends = shoot(np.exp(z[:, X]), np.exp(z[:, SPEED]), self.systems(z, rows), SLOPE)
+            slope = ends.log_rho[:, 1]
+        return self.limits(z, rows, slope)[:, fixed]
+
+
+SHORT, LONG, FAST, FOLD, REAL = range(5)
+KINDS = ("length", "length", "speed", "fold", "real")
+
+
+def boundaries(start: Array, n: Integers, w_f: Array, domain: Domain) -> list[Boundary]:
+    """Whole curves through collisions; those that are on the curve of one before are left out.
+
+    Parameters
+    ----------
+    start : ndarray, shape (points, 4)
+        Collisions: log of the offset of the fish, of the speed, of lambda - lambda_cn, and s.
+    n : ndarray of int, shape (points,)
+    w_f : ndarray, shape (points,)
+    domain : Domain
+
+    Returns
+    -------
+    list of Boundary
+    """
+    found: list[Boundary] = []
+    left = np.arange(len(start))
+    while len(left):
+        # One curve of each n and w_f at a time.
+        _, first = np.unique(np.stack([n[left].astype(float), w_f[left]]), axis=1, return_index=True)
+        now = left[np.sort(first)]
+        equations = Collisions(n[now], w_f[now], domain)
+        rows = np.arange(len(now))
+        direction = tangents(equations(start[now], rows)[1])
+        halves = [follow(equations, start[now], side * direction, _stop, STEPS) for side in (1.0, -1.0)]
+        gone = set(now.tolist())
+        for row, k in enumerate(now):
+            boundary, points = _whole(Collisions(n[k : k + 1], w_f[k : k + 1], domain), halves[0][row], halves[1][row])
+            found.append(boundary)
+            same = [i for i in left if n[i] == n[k] and w_f[i] == w_f[k]]
+            gone |= {i for i in same if _on_curve(points, start[i])}
+        left = np.array([i for i in left if i not in gone], np.int64)
+    return found
+
+
+def _stop(z: Array, tangent: Array, monitors: Array, rows: Integers) -> NDArray[np.bool_]:
+    return np.asarray((monitors < 0.0).any(axis=1))
+
+
+def _whole(equations: Collisions, ahead: Curve, back: Curve) -> tuple[Boundary, Array]:
+    """Both halves as one curve, its ends and turning points solved for; and its points."""
+    parts, kinds = [], []
+    for curve in (back, ahead):
+        points, kind = curve.points, "unknown"
+        if curve.complete and len(points) > 1:
+            crossed = int(np.flatnonzero(curve.monitors[-1] < 0.0)[0])
+            a, b = curve.monitors[-2, crossed], curve.monitors[-1, crossed]
+            guess = curve.between(len(points) - 2, float(a / (a - b)))[None]
+            end, good = equations.solve(guess, np.zeros(1, np.int64), crossed)
+            near = np.linalg.norm(end[0] - guess[0]) < STEPS.longest
+            points = points[:-1]
+            if good[0] and near:
+                points, kind = np.concatenate([points, end]), KINDS[crossed]
+        parts.append(points)
+        kinds.append(kind)
+    points = np.concatenate([parts[0][::-1], parts[1][1:]])
+    turns: list[int] = []
+    k = 1
+    while k < len(points) - 1:
+        before, after = points[k, EXCESS] - points[k - 1, EXCESS], points[k + 1, EXCESS] - points[k, EXCESS]
+        if before * after < 0.0:
+            points[k] = _turning(equations, points[k])
+            turns.append(k)
+        k += 1
+    rows = np.zeros(len(points), np.int64)
+    value, jacobian, _, _ = equations(points, rows)
+    gradient = np.zeros((len(points), 1, UNKNOWNS))
+    gradient[:, 0] = tangents(jacobian)
+    step = solve_systems(
+        np.concatenate([jacobian, gradient], axis=1), np.concatenate([-value, np.zeros((len(points), 1))], 1)
+    )
+    gamma = np.exp(points[:, SPEED])
+    found = Boundary(
+        n=int(equations.n[0]),
+        w_f=float(equations.w_f[0]),
+        lam=equations.threshold[0] + np.exp(points[:, EXCESS]),
+        gamma=gamma,
+        omega=np.sqrt(np.maximum(points[:, S], 0.0)),
+        r_f=np.exp(points[:, X]) / gamma**2,
+        turns=np.array(turns, np.int64),
+        error=np.maximum(np.abs(step[:, SPEED]), np.finfo(float).eps),
+        kinds=(kinds[0], kinds[1]),
+    )
+    return found, points
+
+
+def _turning(equations: Collisions, z: Array) -> Array:
+    """Where the length along a curve is at an extremum, near a point: secants on its direction."""
+    zero = np.zeros(1, np.int64)
+    z, heights, shift = z.copy(), [], 1e-3
+    places = [0.0]
+    start, direction = None, np.zeros(UNKNOWNS)
+    for _ in range(ROUNDS):
+        for _ in range(4):
+            value, jacobian, _, _ = equations(z[None], zero)
+            direction = tangents(jacobian)[0]
+            step = solve_systems(
+                np.concatenate([jacobian, direction[None, None]], axis=1), np.append(-value[0], 0.0)[None]
+            )
+            z = z + step[0]
+            if np.linalg.norm(step) < SETTLED:
+                break
+        start = direction if start is None else start
+        direction = direction * np.sign(direction @ start)
+        heights.append(direction[EXCESS])
+        if len(heights) > 1:
+            if heights[-1] == heights[-2] or abs(heights[-1]) < SETTLED:
+                break
+            shift = -heights[-1] * (places[-1] - places[-2]) / (heights[-1] - heights[-2])
+        shift = float(np.clip(shift, -STEPS.longest, STEPS.longest))
+        places.append(places[-1] + shift)
+        z = z + shift * direction
+    return z
+
+
+def _on_curve(points: Array, z: Array) -> bool:
+    """Whether a point lies on a curve, between its points within what it may be bent."""
+    a, b = points[:-1], points[1:]
+    along = b - a
+    share = np.clip(((z - a) * along).sum(1) / np.maximum(np.square(along).sum(1), 1e-300), 0.0, 1.0)
+    return bool((np.linalg.norm(a + share[:, None] * along - z, axis=1) < 0.02).any())

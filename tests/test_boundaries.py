@@ -1,0 +1,93 @@
+"""Where flutter begins and ends, as curves: against windows of speed, a closed form, and what is between."""
+
+import numpy as np
+import pytest
+
+import towatlas
+from towatlas.limits import unchecked_threshold_length
+
+
+@pytest.fixture(scope="module")
+def light():
+    return towatlas.krein_boundaries(10.0)
+
+
+def pendulum(lam):
+    """Speed at which the conical pendulum begins to flutter."""
+    low, high = 0.01, 0.75
+    for _ in range(60):
+        S = 0.5 * (low + high)
+        low, high = (S, high) if lam < 16.0 * (1.0 - S**2) / (S * (4.0 - 3.0 * S**2) ** 2) else (low, S)
+    return np.sqrt(S / ((lam * S - 1.0) * np.sqrt(1.0 - S**2)))
+
+
+def test_edges_are_those_of_the_windows_of_speed(light):
+    """`flutter` follows modes from speed to speed, and solves for the square of their distance."""
+    curve = max(light, key=lambda curve: curve.lam.max())
+    k = int(np.argmin(np.abs(curve.lam - 3.0)))
+    gamma = float(curve.gamma[k])
+    found = towatlas.flutter(float(curve.lam[k]), 10.0, (0.98 * gamma, 1.02 * gamma))
+    edges = [
+        edge
+        for window in found.windows
+        for edge, kind in ((window.low, window.low_kind), (window.high, window.high_kind))
+        if kind == "krein" and window.nodes == 1
+    ]
+    # A zero of a difference of roots that meet is known to rounding over the slope of its square.
+    assert np.abs(np.array(edges) / gamma - 1.0).min() < 1e-9
+
+
+def test_a_heavy_fish_is_a_conical_pendulum():
+    """Up to the weight of the cable over that of the fish."""
+    errors = []
+    for w_f in (1e3, 1e4):
+        points = [
+            (lam, gamma)
+            for curve in towatlas.krein_boundaries(w_f)
+            for lam, gamma in zip(curve.lam, curve.gamma, strict=True)
+            if 1.8 < lam < 3.0 and gamma < 3.0
+        ]
+        assert len(points) > 2
+        errors.append(max(abs(gamma / pendulum(lam) - 1.0) for lam, gamma in points))
+    assert errors[0] < 1e-2
+    # The largest of points that are not the same.
+    assert errors[1] == pytest.approx(0.1 * errors[0], rel=0.3)
+
+
+def test_ends_and_errors(light):
+    threshold = float(unchecked_threshold_length(10.0, 1))
+    assert {kind for curve in light for kind in curve.kinds} == {"length", "speed", "real"}
+    for curve in light:
+        assert curve.error.max() < 1e-8
+        for end, kind in ((0, curve.kinds[0]), (-1, curve.kinds[1])):
+            excess = curve.lam[end] - threshold
+            if kind == "length":
+                assert min(abs(excess / 0.01 - 1.0), abs(excess / 100.0 - 1.0)) < 1e-9
+            elif kind == "speed":
+                fold = float(towatlas.solve_critical(curve.lam[end], 10.0, 1).gamma)
+                assert curve.gamma[end] == pytest.approx(3.0 * fold, rel=1e-10)
+            else:
+                assert curve.omega[end] < 1e-5
+
+
+def test_two_edges_meet_in_a_cusp():
+    """Where three oscillations are one a curve turns in length and speed; between its halves the shape lasts."""
+    curve = next(curve for curve in towatlas.krein_boundaries(1.0) if len(curve.turns))
+    k = int(curve.turns[0])
+    for values in (curve.lam, curve.gamma):
+        around = values[[k - 1, k + 1]] - values[k]
+        assert (around > 0.0).all() or (around < 0.0).all()
+    lam, gamma = float(curve.lam[k + 4]), float(curve.gamma[k + 4])
+    before = np.argsort(curve.lam[:k])
+    apart = float(np.interp(lam, curve.lam[:k][before], curve.gamma[:k][before])) - gamma
+    kinds = []
+    for share in (-0.5, 0.5):
+        found = towatlas.stability(lam, 1.0, gamma + share * apart)
+        kinds.append(str(found.kind[list(found.equilibria.branch).index("1 inner")]))
+    assert kinds == ["flutter", "stable"]
+
+
+def test_bad_numbers():
+    for w_f, n, words in ((-1.0, 1, "w_f"), (1.0, 0, "whole number")):
+        with pytest.raises(ValueError, match=words):
+            towatlas.krein_boundaries(w_f, n)
