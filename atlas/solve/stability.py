@@ -98,7 +98,7 @@ def stability_of(found: Equilibria) -> Stability:
     >>> [str(kind) for kind in stability_of(equilibria(2.5, 0.0, 2.534)).kind]
     ['divergence', 'flutter', 'stable']
     """
-    count, speed = len(found), abs(found.gamma)
+    count, system, speed = len(found), found.system, abs(found.gamma)
     growth, frequency, error = (np.full(count, np.nan) for _ in range(3))
     unstable, index = np.full(count, -1), np.full(count, -1)
     codes = np.full(count, status.OK, np.int8)
