@@ -75,13 +75,15 @@ def test_an_independent_integration_lies_in_the_enclosures(cable):
 
 
 def test_reference_folds_agree():
-    """As far as they are known: one step of Newton from doubles, which near a threshold leaves 8e-16."""
+    """Two computations of the same numbers; the references have 34 digits."""
     with (REFERENCES / "reference_folds.csv").open() as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     for row in rows[:6]:
-        found = certify(float(row["lam"]), float(row["w_f"]), int(row["n"]), digits=20)
+        found = certify(float(row["lam"]), float(row["w_f"]), int(row["n"]), digits=30)
         assert found.status == CERTIFIED
-        assert abs(Fraction(found.gamma) / Fraction(row["gamma"]) - 1) < 1e-15
+        away = abs(Fraction(found.gamma) - Fraction(row["gamma"]))
+        # What is printed of each is rounded.
+        assert away <= Fraction(found.gamma_radius) + Fraction(row["gamma"]) / 10**33
 
 
 def _certified(rows):

@@ -91,8 +91,8 @@ def flutter_edges(answer: SceneAnswer, reach: float = 0.0) -> FlutterEdges:
     --------
     >>> from towatlas import answer_scene, read_scene
     >>> found = flutter_edges(answer_scene(read_scene("skop-fig3").at(gamma=3.2), model="air", asked=["nodes"]))
-    >>> round(found.above.speed, 4), found.above.enters, found.below
-    (1.3667, True, None)
+    >>> [(round(edge.speed, 4), edge.enters) for edge in (found.below, found.above)]
+    [(1.2115, True), (1.3667, True)]
     """
     model = answer.choice.model if answer.choice.forced else with_drag(answer.scene, answer.choice.model)
     low, high = min(LOOKED[0], 1.0 - reach), max(LOOKED[1], 1.0 + reach)
