@@ -35,6 +35,9 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--gamma", type=speed, metavar="GAMMA", help="prove all equilibria at one speed, instead of a fold"
     )
+    parser.add_argument(
+        "--cover", action="store_true", help="with --gamma: prove their number by covering all offsets of the fish too"
+    )
     parser.add_argument("--n", type=order, default=1, metavar="N", help="number of the transition, default %(default)s")
     parser.add_argument("--digits", type=int, default=30, metavar="D", help="wanted, default %(default)s")
     parser.add_argument("--json", action="store_true", help="JSON instead of lines")
@@ -50,6 +53,8 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     if (options.atlas is None) == (options.lam is None or options.wf is None):
         raise ValueError("name either an ATLAS, or a cable with --lam and --wf")
+    if options.cover and options.gamma is None:
+        raise ValueError("--cover is about all equilibria at one speed; name it with --gamma")
     try:
         if options.atlas is not None:
             return _table(options)
@@ -78,7 +83,7 @@ def _states(options: argparse.Namespace) -> int:
     from towatlas.solve.proof.certificates import CERTIFIED
     from towatlas.solve.proof.states import certify_equilibria
 
-    found = certify_equilibria(options.lam, options.wf, options.gamma)
+    found = certify_equilibria(options.lam, options.wf, options.gamma, cover=options.cover)
     if options.json:
         print_json(dataclasses.asdict(found))
     else:

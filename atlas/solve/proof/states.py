@@ -9,6 +9,7 @@ from towatlas.solve.equilibria import equilibria
 from towatlas.solve.proof.arithmetic import Refused, arb, binary, working_bits
 from towatlas.solve.proof.certificates import (
     BITS,
+    BY_THEOREM,
     CERTIFIED,
     MORE,
     NO_TRANSITION,
@@ -17,11 +18,13 @@ from towatlas.solve.proof.certificates import (
     certify,
     decimal,
 )
+from towatlas.solve.proof.covering import cover as cover_offsets
 from towatlas.solve.proof.finding import find_chain, refine_columns
 from towatlas.solve.proof.index import zeros
 from towatlas.solve.proof.krawczyk import end_hull, prove
 
 DIGITS = 30
+BY_COVERING = "by covering"
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,8 @@ class CertifiedEquilibria:
         In rising order of R_x0, those proved.
     passed : int or None
         Number of critical speeds below gamma, proved; then there are 1 + 2 passed equilibria.
+    count : str or None
+        Why there are no others: "by theorem", "by covering" or "by theorem and by covering"; None if not CERTIFIED.
     reason : str
         What was proved, or why not.
     """
@@ -67,10 +72,11 @@ class CertifiedEquilibria:
     status: str
     states: tuple[CertifiedState, ...]
     passed: int | None
+    count: str | None
     reason: str
 
 
-def certify_equilibria(lam: float, w_f: float, gamma: float) -> CertifiedEquilibria:
+def certify_equilibria(lam: float, w_f: float, gamma: float, *, cover: bool = False) -> CertifiedEquilibria:
     """All equilibria of a cable in a vacuum at one speed, proved, and their number.
 
     Parameters
@@ -79,6 +85,9 @@ def certify_equilibria(lam: float, w_f: float, gamma: float) -> CertifiedEquilib
         Cable length, > 0, and fish weight, >= 0 [-]; exactly these doubles.
     gamma : float
         Speed [-], > 0; exactly this double.
+    cover : bool
+        Whether to prove their number by a covering of all offsets of the fish besides: seconds, minutes where there are
+        many. Where it gives up, and the theorem holds, `reason` says so.
 
     Returns
     -------
@@ -97,7 +106,8 @@ def certify_equilibria(lam: float, w_f: float, gamma: float) -> CertifiedEquilib
     -----
     Roots as folds are proved, with gamma given in place of q = 0. Their number is 1 + 2 #{n: gamma > gamma_cn} by
     theorem (docs/proofs.md, Theorem 6), and gamma_c1 < gamma_c2 < ... are certified until one lies above gamma or the
-    cable has no more. Members of pair n have the sign (-1)^n at the fish and n - 1 (outer) or n zeros of q (inner).
+    cable has no more. Members of pair n have the sign (-1)^n at the fish and n - 1 (outer) or n zeros of q (inner). A
+    covering uses no theorem on their number: docs/certify.md.
 
     References
     ----------
@@ -119,13 +129,33 @@ def certify_equilibria(lam: float, w_f: float, gamma: float) -> CertifiedEquilib
             except Refused as refused:
                 reasons.append((refused.status, f"{branch}: {refused}"))
         passed, why = _passed(lam=lam, w_f=w_f, gamma=gamma)
-    if passed is None:
-        reasons.append((NOT_ISOLATED, why))
-    elif not reasons and len(states) != 1 + 2 * passed:
-        reasons.append((NOT_ISOLATED, f"{len(states)} equilibria are proved, of {1 + 2 * passed}"))
+        ways = [(BY_THEOREM, None if passed is None else 1 + 2 * passed, why)]
+        if cover:
+            ways.append((BY_COVERING, *_covered(lam=lam, w_f=w_f, gamma=gamma)))
+    count, why = _count(ways)
+    reasons += [] if count else [(NOT_ISOLATED, why)]
+    for _, number, _ in ways:
+        if not reasons and number not in (None, len(states)):
+            reasons.append((NOT_ISOLATED, f"{len(states)} equilibria are proved, of {number}"))
     if reasons:
-        return CertifiedEquilibria(lam, w_f, gamma, reasons[0][0], tuple(states), passed, reasons[0][1])
-    return CertifiedEquilibria(lam, w_f, gamma, CERTIFIED, tuple(states), passed, f"all of them, by theorem: {why}")
+        status, why = reasons[0]
+        return CertifiedEquilibria(lam, w_f, gamma, status, tuple(states), passed, None, why)
+    return CertifiedEquilibria(lam, w_f, gamma, CERTIFIED, tuple(states), passed, count, f"all of them, {why}")
+
+
+def _count(ways: list[tuple[str, int | None, str]]) -> tuple[str | None, str]:
+    """By which ways the number is known, and what each says."""
+    done = [way for way, number, _ in ways if number is not None]
+    said = "; ".join(f"{way}: {why}" for way, _, why in ways)
+    return " and ".join(done) or None, said
+
+
+def _covered(*, lam: float, w_f: float, gamma: float) -> tuple[int | None, str]:
+    try:
+        found = cover_offsets(lam, w_f, gamma)
+    except Refused as refused:
+        return None, f"not proved, {refused}"
+    return found.roots, f"{found.roots} roots on {found.ranges} ranges of offsets"
 
 
 def _state(*, lam: float, w_f: float, gamma: float, branch: str, x_f: float) -> CertifiedState:
