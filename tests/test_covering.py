@@ -12,7 +12,7 @@ from towatlas.cli import main
 from towatlas.solve.proof import family, states
 from towatlas.solve.proof.arithmetic import Refused, arb, working_bits
 from towatlas.solve.proof.certificates import CERTIFIED, NOT_ISOLATED
-from towatlas.solve.proof.covering import Covering, _Count, cover
+from towatlas.solve.proof.covering import USED, Covering, _Count, cover
 
 CABLES = [(37.8, 1352.0, 2.0, 0.7), (10.0, 0.0, 1.2, 3.0)]
 
@@ -71,7 +71,7 @@ def test_a_speed_at_a_fold_is_refused():
 
 
 def _off(lam, w_f, gamma, a):
-    """The bound of a family of 10 % about a, and by how much three shots of 45 digits leave its polynomial."""
+    """The bound of a family about a, and by how much shots of 45 digits leave it in p, and in q its bound by Cauchy."""
     weight, G, length = Fraction(w_f), Fraction(gamma) ** 2, Fraction(lam)
     middle, radius = Fraction(a), Fraction(a) / 16
     with working_bits(128):
@@ -79,12 +79,14 @@ def _off(lam, w_f, gamma, a):
     away = []
     with mp.workdps(45):
         coefficients = [mp.mpf(value.mid().str(40, radius=False)) for value in found.p]
-        for alpha in (Fraction(-1), Fraction(1, 3), Fraction(1)):
+        for alpha in (-USED, Fraction(1, 3), USED):
             offset = middle + alpha * radius
             exact = [mp.mpf(value.numerator) / value.denominator for value in (offset, G, length, weight)]
-            _, p, _ = shoot(*exact)
+            _, p, q = shoot(*exact)
             z = mp.mpf(alpha.numerator) / alpha.denominator
+            slope = mp.fsum(k * c * z ** (k - 1) for k, c in enumerate(coefficients) if k)
             away.append(abs(p - mp.fsum(c * z**k for k, c in enumerate(coefficients))))
+            away.append(abs(q * float(radius) - slope) * float(1 - USED))
     return float(found.off), float(max(away))
 
 
