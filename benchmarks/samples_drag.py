@@ -130,11 +130,17 @@ def fold_reference(kind: str) -> DragReference:
     return _read(f"reference_drag_{kind}", ("n",) if kind == "pairs" else ("low",), "gamma")
 
 
-def _log_rho(x: Any, gamma: Any, system: System) -> Any:
-    sys.path.insert(0, str(ROOT / "tests"))
+def long_shots() -> Any:
+    """The module of the shots in long double."""
+    if str(ROOT / "tests") not in sys.path:
+        sys.path.insert(0, str(ROOT / "tests"))
     import reference_drag
 
-    state = reference_drag.shot(np.exp(np.longdouble(x)), gamma, system)
+    return reference_drag
+
+
+def _log_rho(x: Any, gamma: Any, system: System) -> Any:
+    state = long_shots().shot(np.exp(np.longdouble(x)), gamma, system)
     return np.log(state[0] ** 2 + state[1] ** 2) / 2
 
 
@@ -150,6 +156,26 @@ def exact_shape(r_f: float, gamma: float, system: System) -> str:
             break
         value = [value[1], _log_rho(x[1], gamma, system)]
     return np.format_float_scientific(np.exp(x[1]), DIGITS - 1)
+
+
+def exact_place(r_f: float, gamma: float, system: System) -> dict[str, Any]:
+    """r_f, z_f, phase_deg less whole turns and tension of a shape in long double, from a double."""
+    radius = np.longdouble(exact_shape(r_f, gamma, system))
+    state = long_shots().shot(radius, gamma, system)
+    return {
+        "r_f": radius,
+        "z_f": -state[2],
+        "phase_deg": np.degrees(np.arctan2(state[1], state[0])),
+        "tension": np.sqrt(state[3:] @ state[3:]),
+    }
+
+
+def fish_at_fold(gamma: float, system: System) -> float:
+    """r_f at the fold nearest to a speed, in double precision."""
+    import towatlas
+
+    found = towatlas.folds(gamma=(gamma * 0.99, gamma * 1.01), **named(system))
+    return float(found.r_f[np.argmin(np.abs(found.gamma - gamma))])
 
 
 def exact_fold(r_f: float, gamma: float, system: System) -> str:
@@ -191,12 +217,15 @@ SHAPES = (
 PAIRS = (
     "gamma at which the n-th pair of shapes appears; extrema of the radius by five shots in long double\n"
     "(tests/reference_drag.py). Random cables for which solve_drag_folds finds one: lam 16 to 60, w_f 1e-2 to 2000,\n"
-    "C 1e-3 to 1, n 1 to 3."
+    "C 1e-3 to 1, n 1 to 3. Of the 20 digits 16 are good: of 12 rows at random other steps and other shots for the\n"
+    "extremum (python -m benchmarks.digits 12 reference_drag_pairs) moved none by more than 2e-17, relative."
 )
 OCTAVES = (
     "All folds within an octave of speed from low. Counted by an independent code, DOP853 with dense scans of r_f at\n"
     "60 speeds between 0.05 and 20 (air), 0.001 and 0.3 (water), and bisection; in long double they moved by at most\n"
-    "5e-8, what bisection had left (tests/reference_drag.py)."
+    "5e-8, what bisection had left (tests/reference_drag.py). Of the 20 digits 15 are good: of 12 rows at random\n"
+    "other steps and other shots for the extremum (python -m benchmarks.digits 12 reference_drag_octaves) moved none\n"
+    "by more than 3e-16, relative."
 )
 
 
@@ -205,8 +234,6 @@ def _row(system: System, **others: str) -> dict[str, str]:
 
 
 def main() -> None:
-    import towatlas
-
     known = shape_reference()
     write_table(
         DATA / "reference_drag.csv",
@@ -220,11 +247,9 @@ def main() -> None:
     for kind, about in (("pairs", PAIRS), ("octaves", OCTAVES)):
         known, rows = fold_reference(kind), []
         for gamma, k in zip(known.exact[0], known.row, strict=True):
-            s, near = known.systems[k], (gamma * 0.99, gamma * 1.01)
-            found = towatlas.folds(gamma=near, **named(s))
-            r_f = float(found.r_f[np.argmin(np.abs(found.gamma - gamma))])
+            s = known.systems[k]
             beside = {name: f"{value:.17g}" for name, value in known.given[k].items()}
-            rows.append(_row(s, **beside, gamma=exact_fold(r_f, gamma, s)))
+            rows.append(_row(s, **beside, gamma=exact_fold(fish_at_fold(gamma, s), gamma, s)))
         write_table(DATA / f"reference_drag_{kind}.csv", about, rows)
 
 
