@@ -10,6 +10,7 @@ index says.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -96,6 +97,20 @@ def modes(motion: Motion, refined: int = 0) -> Modes:
     degree, panel = DEGREE + 3 * refined, PANEL / 1.5**refined
     unknowns = 2 * (degree + 1) * int(_panel_of_step(motion, panel)[-1] + 1)
     check_foreseen(SECONDS_A_CUBE * unknowns**3, f"modes of {unknowns} unknowns", REMEDY)
+    # Matrices this small are no work for two: on busy cores the threads of BLAS would wait for each other, thirty times
+    # as long as one takes alone.
+    with _blas().limit(limits=1, user_api="blas"):
+        return _modes(motion, refined, degree, panel)
+
+
+@cache
+def _blas() -> Any:
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+def _modes(motion: Motion, refined: int, degree: int, panel: float) -> Modes:
     mass, friction, stiffness = matrices(motion, degree, panel)
     # With the mass as unit.
     inverse = np.linalg.inv(np.linalg.cholesky(mass))
