@@ -7,55 +7,39 @@ or written, is damaged, or holds something else, 6 a limit that was set is not k
 import argparse
 import math
 import sys
+from collections.abc import Iterable
 from contextlib import nullcontext
+from importlib import import_module
 
 from towatlas import __version__
-from towatlas.commands import (
-    build,
-    certify,
-    critical,
-    design,
-    device,
-    diagram,
-    equilibria,
-    fish,
-    flutter,
-    folds,
-    info,
-    plot,
-    report,
-    scene,
-    shape,
-    stability,
-    sweep,
-)
 from towatlas.commands.common import FAILED, FILE, OK, USAGE, announce_compilation, say, shown_progress
 from towatlas.effort import patience
 from towatlas.tables.seal import AtlasFileError
 
-# In the order in which help lists them.
+# In the order in which help lists them; each a module of towatlas.commands.
 COMMANDS = (
-    critical,
-    certify,
-    folds,
-    equilibria,
-    stability,
-    flutter,
-    diagram,
-    shape,
-    fish,
-    scene,
-    sweep,
-    design,
-    device,
-    build,
-    plot,
-    report,
-    info,
+    "critical",
+    "certify",
+    "folds",
+    "equilibria",
+    "stability",
+    "flutter",
+    "diagram",
+    "shape",
+    "fish",
+    "scene",
+    "sweep",
+    "design",
+    "device",
+    "build",
+    "plot",
+    "report",
+    "info",
 )
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
+    """The parser of these commands, whose modules are imported for it."""
     parser = argparse.ArgumentParser(
         prog="towatlas",
         description="Critical speeds of a cable towed in a circle: at what speed does it jump, and to what shape?",
@@ -66,14 +50,17 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"towatlas {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
-    for command in COMMANDS:
-        command.add(commands)
+    for name in names:
+        import_module(f"towatlas.commands.{name}").add(commands)
     return parser
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    arguments = sys.argv[1:] if arguments is None else arguments
+    # Who asks for one command does not wait for the modules of the others.
+    named = arguments[:1] if arguments and arguments[0] in COMMANDS else COMMANDS
+    options = _parser(named).parse_args(arguments)
     announce_compilation()
     # Commands without that option look up, or take their time and show it themselves.
     limited = "patience" in options

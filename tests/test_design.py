@@ -292,7 +292,7 @@ def test_cables_without_transitions(ask):
     assert code == 0
     assert row["nearest_gamma"] is None
     code, out, _ = ask("--depth", "1 cm", "--max-length", "1.2 cm", "--gamma", 0.1)
-    assert out.splitlines()[-1].split()[-4:] == ["none", "-", "-", "expected"]
+    assert out.splitlines()[-1].split()[-5:] == ["none", "-", "-", "stable", "expected"]
 
 
 def test_a_search_of_minutes_is_refused():

@@ -197,6 +197,15 @@ def test_lookup_imports_nothing_heavy(atlas_path):
     assert done.stdout.splitlines()[-1] == "[]"
 
 
+def test_the_shell_begins_with_nothing_heavy():
+    code = (
+        "import sys, towatlas.cli\n"
+        "print([m for m in ('numba', 'xarray', 'matplotlib', 'scipy', 'pandas', 'pint') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 def test_nothing_within_rounding_of_the_threshold(atlas_file):
     """A few ulp beyond lambda_cn the excess length is all rounding: outside the atlas, however the ends are rounded."""
     rng = np.random.default_rng(8)

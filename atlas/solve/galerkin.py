@@ -10,12 +10,12 @@ index says.
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
 
 from towatlas.effort import check_foreseen
-from towatlas.kernels.variation import TERMS
 from towatlas.solve.motion import Array, Complex, Integers, Motion
 
 # Gauss nodes a panel beyond the degree.
@@ -97,6 +97,20 @@ def modes(motion: Motion, refined: int = 0) -> Modes:
     degree, panel = DEGREE + 3 * refined, PANEL / 1.5**refined
     unknowns = 2 * (degree + 1) * int(_panel_of_step(motion, panel)[-1] + 1)
     check_foreseen(SECONDS_A_CUBE * unknowns**3, f"modes of {unknowns} unknowns", REMEDY)
+    # Matrices this small are no work for two: on busy cores the threads of BLAS would wait for each other, thirty times
+    # as long as one takes alone.
+    with _blas().limit(limits=1, user_api="blas"):
+        return _modes(motion, refined, degree, panel)
+
+
+@cache
+def _blas() -> Any:
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+def _modes(motion: Motion, refined: int, degree: int, panel: float) -> Modes:
     mass, friction, stiffness = matrices(motion, degree, panel)
     # With the mass as unit.
     inverse = np.linalg.inv(np.linalg.cholesky(mass))
@@ -174,7 +188,7 @@ def _panels(motion: Motion, degree: int, panel: float) -> Iterator[_Panel]:
     for j in range(of_step[-1] + 1):
         steps = np.flatnonzero(of_step == j)
         k, part, whole = _places(motion, steps, share)
-        values = np.einsum("qro,qo->qr", motion.series[k], part[:, None] ** np.arange(TERMS))
+        values = np.einsum("qro,qo->qr", motion.series[k], part[:, None] ** np.arange(motion.series.shape[-1]))
         P, TA, EP = (values[:, 1 + 9 * i : 10 + 9 * i].reshape(-1, 3, 3) for i in range(3))
         length, tension = whole * weights, values[:, 0]
         slope = _slopes(P, polynomials)
@@ -194,12 +208,12 @@ def _panels(motion: Motion, degree: int, panel: float) -> Iterator[_Panel]:
 
 def _places(motion: Motion, steps: Integers, share: Array) -> tuple[Integers, Array, float]:
     """Where shares of the length of some steps are: number and part of the step; and that length."""
-    lengths = motion.series[:, 0] / np.arange(1, TERMS + 1) * motion.sizes[:, None]
+    powers = np.arange(motion.series.shape[-1])
+    lengths = motion.series[:, 0] / (powers + 1) * motion.sizes[:, None]
     borders = np.concatenate([[0.0], np.cumsum(lengths[steps].sum(1))])
     target = borders[-1] * share
     k = np.clip(np.searchsorted(borders, target, side="right") - 1, 0, len(steps) - 1)
     target, k = target - borders[k], steps[k]
-    powers = np.arange(TERMS)
     low, high = np.zeros(len(share)), np.ones(len(share))
     part = np.full(len(share), 0.5)
     for _ in range(NEWTON):

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from towatlas.effort import check_patience
 from towatlas.kernels import status
 from towatlas.kernels.system import C_F, C_S, C_T, M_F, C
-from towatlas.kernels.variation import ROWS, TERMS
 from towatlas.solve.batches import batches
 from towatlas.solve.jets import jets_of
 from towatlas.solve.shots import upright
@@ -125,7 +124,7 @@ class Motions:
         values : ndarray of complex, shape (points,)
         logs : ndarray, shape (points,)
         """
-        from towatlas.kernels.variation import evans
+        from towatlas.kernels.variation import TERMS, evans
 
         sigma = np.ascontiguousarray(sigma, np.complex128)
         values, logs = np.empty(len(sigma), np.complex128), np.empty(len(sigma))
@@ -191,7 +190,7 @@ def motions(
 
 def _side_by_side(r_f: Array, gamma: Array, systems: Array, reach: Array, bound: float) -> list[Motion]:
     from towatlas.kernels.drag_shots import Algebra, Shots
-    from towatlas.kernels.variation import expand_shapes
+    from towatlas.kernels.variation import ROWS, TERMS, expand_shapes
 
     rows, gamma2 = len(r_f), np.square(gamma)
     algebra = Algebra(*jets_of(0).algebra)

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from towatlas.effort import SECONDS, TooMuchWork, check_patience, patience
 from towatlas.kernels import status
 from towatlas.kernels.system import COLUMNS
-from towatlas.kernels.variation import threads
 from towatlas.solve.growth import REMEDY
 from towatlas.solve.many import equilibria_many
 from towatlas.solve.motion import Array, Integers
@@ -119,6 +118,8 @@ def growth_columns(
     dict of ndarray, shape (systems, shapes)
         FIELDS.
     """
+    from towatlas.kernels.variation import threads
+
     missing: dict[str, Any] = {
         "growth": np.nan,
         "frequency": np.nan,

@@ -5,11 +5,12 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
-
-import netCDF4
+from typing import TYPE_CHECKING, Any
 
 from towatlas.tables.seal import AtlasFileError, read_sealed
+
+if TYPE_CHECKING:
+    import netCDF4
 
 SCHEMA_VERSION = 1
 # Where the files are put by default, and looked for.
@@ -29,7 +30,10 @@ def default_path() -> Path:
     return Path(os.environ.get("TOWATLAS_FILE", "build/atlas.nc"))
 
 
-def _dataset(path: Path, data: bytes) -> netCDF4.Dataset:
+def _dataset(path: Path, data: bytes) -> "netCDF4.Dataset":
+    # Who opens no file does not wait for the library.
+    import netCDF4
+
     try:
         file = netCDF4.Dataset(path.name, memory=data)
     except (OSError, RuntimeError) as error:
@@ -39,7 +43,7 @@ def _dataset(path: Path, data: bytes) -> netCDF4.Dataset:
 
 
 @contextmanager
-def open_group(path: Path, data: bytes) -> Iterator[netCDF4.Dataset]:
+def open_group(path: Path, data: bytes) -> Iterator["netCDF4.Dataset"]:
     """The file whose bytes these are, for reading at once: the NetCDF library is not safe to call from two threads.
 
     Parameters
