@@ -70,6 +70,12 @@ def test_a_speed_at_a_fold_is_refused():
         assert cover(37.8, 1352.0, gamma * beside).roots == roots
 
 
+@pytest.mark.parametrize("system", [(5.0, 1.0, 1e-170), (5.0, 0.0, 1e80), (5.0, 1e200, 1e100), (5.0, 0.0, 1e-30)])
+def test_extreme_numbers_are_refused_with_a_reason(system):
+    with pytest.raises(Refused, match=r"too small or too large|next to the offset"):
+        cover(*system)
+
+
 def _off(lam, w_f, gamma, a):
     """The bound of a family about a, and by how much shots of 45 digits leave it in p, and in q its bound by Cauchy."""
     weight, G, length = Fraction(w_f), Fraction(gamma) ** 2, Fraction(lam)

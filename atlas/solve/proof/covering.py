@@ -21,6 +21,8 @@ USED = Fraction(7, 8)
 FIRST, LARGEST, LEAST = Fraction(1, 16), Fraction(1, 2), Fraction(1, 2048)
 DEEPEST = 12
 MOST_RANGES = 5000
+# Powers of numbers in between do not leave the range of floats.
+LARGE = Fraction(2) ** 200
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,8 @@ def cover(lam: float, w_f: float, gamma: float) -> Covering:
         If it takes longer than `towatlas.patience` allows.
     """
     weight, G, length = Fraction(w_f), Fraction(gamma) ** 2, Fraction(lam)
+    if not all(1 / LARGE < size < LARGE for size in (G, (weight + length) * G, weight * G) if size):
+        raise Refused("WRAPPED", "gamma^2, or weight or length times it, is too small or too large for floats")
     with working_bits(BITS):
         low, high = _ends(weight, G, length)
         count = _Count(ball(G))

@@ -104,7 +104,8 @@ def enclose(w_f: Fraction, G: Fraction, lam: Fraction, middle: Fraction, radius:
     ends = [ball(t) * value for value in known], known
     omega, off = arb(1), arb(0)
     for steps in range(1, MOST_STEPS):
-        series = _tip_series(a) if t == 0 else _series(f, p, float(t))
+        with np.errstate(all="ignore"):
+            series = _tip_series(a) if t == 0 else _series(f, p, float(t))
         h = min(_length(series, float(t)), t_end - t)
         piece = _piece(series, t, h)
         if t == 0:
