@@ -28,8 +28,8 @@ equilibria: install  ## build build/equilibria.nc, the table of fish positions
 drag: install  ## build build/atlas.nc with the folds with drag in it; some minutes
 	$(BIN)/python -m towatlas build --drag --out $(ATLAS)
 
-test: install  ## run the tests
-	$(BIN)/python -m pytest
+test: install  ## run the tests, on two cores
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 bench: install  ## chart error against time, compare the ratios, update docs and README
 	-$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[peers]'

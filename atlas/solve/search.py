@@ -248,8 +248,7 @@ class _Search:
             value, slope = self._shoot(rows[k[i]], z) * rising[i]
             return value, slope
 
-        chord = x[k] + (x[k + 1] - x[k]) * height[k] / (height[k] - height[k + 1])
-        found, solved = bracket(radius, x[k], x[k + 1], start=chord, last_step=LAST_STEP)
+        found, solved = bracket(radius, x[k], x[k + 1], last_step=LAST_STEP)
         lost = rows[k[~solved]]
         self.codes[lost[self.codes[lost] == status.OK]] = status.NOT_CONVERGED
         good = solved & np.isfinite(found)
