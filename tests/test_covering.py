@@ -50,14 +50,14 @@ def test_a_missing_equilibrium_is_refused(monkeypatch, lost):
 
 
 def test_the_theorem_stands_where_a_covering_gives_up(monkeypatch):
-    def refused(*_):
+    def refused(**_):
         raise Refused("WRAPPED", "too wide")
 
     monkeypatch.setattr(states, "cover_offsets", refused)
     found = certify_equilibria(2.0, 0.0, 1.0, cover=True)
     assert (found.status, found.count) == (CERTIFIED, "by theorem")
     assert "by covering: not proved, too wide" in found.reason
-    monkeypatch.setattr(states, "cover_offsets", lambda *_: Covering(3, 1))
+    monkeypatch.setattr(states, "cover_offsets", lambda **_: Covering(3, 1))
     assert certify_equilibria(2.0, 0.0, 1.0, cover=True).status == NOT_ISOLATED
 
 
@@ -65,15 +65,16 @@ def test_a_speed_at_a_fold_is_refused():
     """There p touches gamma^2 to within what a double leaves, and its slope vanishes."""
     gamma = float(certify(37.8, 1352.0, 1).gamma)
     with pytest.raises(Refused, match="next to the offset"):
-        cover(37.8, 1352.0, gamma)
+        cover(lam=37.8, w_f=1352.0, gamma=gamma)
     for beside, roots in ((0.999, 1), (1.001, 3)):
-        assert cover(37.8, 1352.0, gamma * beside).roots == roots
+        assert cover(lam=37.8, w_f=1352.0, gamma=gamma * beside).roots == roots
 
 
 @pytest.mark.parametrize("system", [(5.0, 1.0, 1e-170), (5.0, 0.0, 1e80), (5.0, 1e200, 1e100), (5.0, 0.0, 1e-30)])
 def test_extreme_numbers_are_refused_with_a_reason(system):
+    lam, w_f, gamma = system
     with pytest.raises(Refused, match=r"too small or too large|next to the offset"):
-        cover(*system)
+        cover(lam=lam, w_f=w_f, gamma=gamma)
 
 
 def _off(lam, w_f, gamma, a):
@@ -81,7 +82,7 @@ def _off(lam, w_f, gamma, a):
     weight, G, length = Fraction(w_f), Fraction(gamma) ** 2, Fraction(lam)
     middle, radius = Fraction(a), Fraction(a) / 16
     with working_bits(128):
-        found = family.enclose(weight, G, length, middle, radius)
+        found = family.enclose(lam=length, w_f=weight, G=G, middle=middle, radius=radius)
     away = []
     with mp.workdps(45):
         coefficients = [mp.mpf(value.mid().str(40, radius=False)) for value in found.p]

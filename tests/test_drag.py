@@ -298,7 +298,7 @@ def test_what_a_shot_refuses():
     assert (long.status[0], long.steps[0]) == (status.STEP_LIMIT, 500_000)
     overflowing = shoot([1e200], 1.0, replace(system, lam=10.0, w_f=1.0, m_f=1e200).row(), jets_of(0))
     assert overflowing.status[0] == status.BAD_INPUT
-    with towatlas.patience(1.0), pytest.raises(towatlas.TooMuchWork, match="too many for 1 s of CPU: 3 s or more"):
+    with towatlas.patience(1.0), pytest.raises(towatlas.TooMuchWork, match="too many for 1 s of CPU: "):
         towatlas.equilibria(system.lam, 0.0, 20.0, C=system.C)
     rows = np.tile(system.row(), (5000, 1))
     with towatlas.patience(1.0), pytest.raises(towatlas.TooMuchWork, match="shots with drag: not finished"):

@@ -41,7 +41,7 @@ class Covering:
     ranges: int
 
 
-def cover(lam: float, w_f: float, gamma: float) -> Covering:
+def cover(*, lam: float, w_f: float, gamma: float) -> Covering:
     """The number of equilibria of a cable at one speed, proved.
 
     Parameters
@@ -64,7 +64,7 @@ def cover(lam: float, w_f: float, gamma: float) -> Covering:
     if not all(1 / LARGE < size < LARGE for size in (G, (weight + length) * G, weight * G) if size):
         raise Refused("WRAPPED", "gamma^2, or weight or length times it, is too small or too large for floats")
     with working_bits(BITS):
-        low, high = _ends(weight, G, length)
+        low, high = _ends(lam=length, w_f=weight, G=G)
         count = _Count(ball(G))
         part, ranges = FIRST, 0
         while low < high:
@@ -75,7 +75,9 @@ def cover(lam: float, w_f: float, gamma: float) -> Covering:
             radius = _short(low * part)
             middle = low + USED * radius
             try:
-                levels = _levels(enclose(weight, G, length, middle, radius), count.level, -USED, USED)
+                levels = _levels(
+                    enclose(lam=length, w_f=weight, G=G, middle=middle, radius=radius), count.level, -USED, USED
+                )
             except Refused as refused:
                 part *= Fraction(2, 3)
                 if part < LEAST:
@@ -89,7 +91,7 @@ def cover(lam: float, w_f: float, gamma: float) -> Covering:
     return Covering(count.roots, ranges)
 
 
-def _ends(w_f: Fraction, G: Fraction, lam: Fraction) -> tuple[Fraction, Fraction]:
+def _ends(*, lam: Fraction, w_f: Fraction, G: Fraction) -> tuple[Fraction, Fraction]:
     """Between which offsets equilibria can be; the lower rounded down."""
     weight = ball(w_f)
     least = (ball(G) / (1 + weight * ball(G)).sqrt()).max(ball(G) / (weight + (1 + weight**2).sqrt()))

@@ -80,13 +80,13 @@ def ball(value: Fraction) -> arb:
     return binary(value.numerator, 1 - value.denominator.bit_length())
 
 
-def enclose(w_f: Fraction, G: Fraction, lam: Fraction, middle: Fraction, radius: Fraction) -> Family:
+def enclose(*, lam: Fraction, w_f: Fraction, G: Fraction, middle: Fraction, radius: Fraction) -> Family:
     """p at the tow point for all offsets within `radius` of `middle`.
 
     Parameters
     ----------
-    w_f, G, lam, middle, radius : Fraction
-        Fish weight, gamma^2, cable length, offsets; denominators powers of two.
+    lam, w_f, G, middle, radius : Fraction
+        Cable length, fish weight, gamma^2, offsets; denominators powers of two.
 
     Returns
     -------

@@ -152,7 +152,7 @@ def _count(ways: list[tuple[str, int | None, str]]) -> tuple[str | None, str]:
 
 def _covered(*, lam: float, w_f: float, gamma: float) -> tuple[int | None, str]:
     try:
-        found = cover_offsets(lam, w_f, gamma)
+        found = cover_offsets(lam=lam, w_f=w_f, gamma=gamma)
     except Refused as refused:
         return None, f"not proved, {refused}"
     return found.roots, f"{found.roots} roots on {found.ranges} ranges of offsets"
