@@ -1,7 +1,7 @@
 """How much CPU time a call may take before it has to say so: patience.
 
 Every public function that computes begins with a budget of its own, or uses that of the caller. Loops ask before each
-round whether it is used up. Time in which kernels are compiled does not count: it is spent once.
+round whether it is used up. Kernels are compiled in other processes, once: that does not count.
 """
 
 import time
@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-
-from towatlas.kernels import notice
 
 # What a call may take unless told otherwise, s of CPU of the whole process, so that parallel kernels count in full.
 SECONDS = 30.0
@@ -69,8 +67,8 @@ _listener: Callable[[Progress | None], object] = repr
 
 
 def _clock() -> float:
-    """CPU time of this process without compilations, s."""
-    return time.process_time() - notice.compilation_seconds()
+    """CPU time of this process, s; kernels are compiled in others."""
+    return time.process_time()
 
 
 @contextmanager

@@ -4,12 +4,11 @@ import argparse
 import sys
 import time
 
-import numba
-
 from benchmarks import coldstart, drag, figures, folds, lookup, report, shots, stability, targets
 from benchmarks.peers_shots import missing
 from benchmarks.samples import ROOT
 from benchmarks.timing import Row
+from towatlas.kernels.sweeps import limited_threads
 from towatlas.tables.file import default_path
 
 # Rows of the second chart that the README shows: method, start of the setting.
@@ -55,18 +54,16 @@ def main() -> int:
     build_seconds, mebibytes = coldstart.build()
     found = targets.of_memory(mebibytes) + targets.of_threads()
 
-    threads = numba.get_num_threads()
-    numba.set_num_threads(1)
-    _say("shots ...")
-    shot_rows = shots.measure()
-    found += targets.of_shots(shot_rows) + targets.of_forward_shots()
-    _say("critical speeds ...")
-    fold_rows = folds.measure(table)
-    found += targets.of_tables(fold_rows) + targets.of_folds()
-    _say("lookup ...")
-    lookup_rows, construct = lookup.measure(table)
-    found += targets.of_lookup(lookup_rows)
-    numba.set_num_threads(threads)
+    with limited_threads(1):
+        _say("shots ...")
+        shot_rows = shots.measure()
+        found += targets.of_shots(shot_rows) + targets.of_forward_shots()
+        _say("critical speeds ...")
+        fold_rows = folds.measure(table)
+        found += targets.of_tables(fold_rows) + targets.of_folds()
+        _say("lookup ...")
+        lookup_rows, construct = lookup.measure(table)
+        found += targets.of_lookup(lookup_rows)
     found += drag.run(_say)
     stability.run(_say)
     worst = lookup.whole_domain(table)

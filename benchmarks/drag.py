@@ -7,7 +7,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import numba
 import numpy as np
 
 import towatlas
@@ -217,8 +216,6 @@ def run(say: Callable[[str], None]) -> list[Target]:
     """Measure, draw and write all of it, each part when it is there; one thread."""
     if moordyn.missing():
         say("moordyn is not installed and left out: pip install '.[peers]'")
-    threads = numba.get_num_threads()
-    numba.set_num_threads(1)
 
     def write(name: str, text: str) -> None:
         report.put(report.METHODS, name, text)
@@ -240,7 +237,6 @@ def run(say: Callable[[str], None]) -> list[Target]:
     found = targets_drag.measure()
     write("drag targets", report.targets_table(found))
     write("drag machine", report.machine() + "\n")
-    numba.set_num_threads(threads)
     return found
 
 

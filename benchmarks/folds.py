@@ -8,8 +8,7 @@ import towatlas
 from benchmarks import peers_folds as peers
 from benchmarks.samples import FoldReference, cables, fold_reference
 from benchmarks.timing import LOST, Row, once, seconds
-from towatlas.kernels.folds import Cables, Folds, solve_folds
-from towatlas.kernels.scan import scan_system
+from towatlas.kernels.calls import Cables, Folds, scan_system, solve_folds
 from towatlas.limits import excess_length
 from towatlas.tables.atlas import Atlas
 

@@ -14,8 +14,9 @@ import numpy as np
 from scipy.integrate._ivp import dop853_coefficients as dop853
 
 import towatlas.kernels.lanes
-from towatlas.kernels import steppers
-from towatlas.kernels.lanes import END_COLUMNS, FOLD_COLUMNS
+from towatlas.kernels import calls, steppers
+from towatlas.kernels.calls import END_COLUMNS, FOLD_COLUMNS
+from towatlas.kernels.compiling import opened
 from towatlas.kernels.steppers import taylor_step
 from towatlas.kernels.vacuum import boundary_error, forward_slopes, start
 
@@ -28,7 +29,7 @@ E3, E5 = dop853.E3.copy(), dop853.E5.copy()
 Array = np.ndarray
 
 
-def march(a: Array, mu: Array, tau: Array, kernel: Callable = towatlas.kernels.lanes.march) -> tuple[Array, Array]:
+def march(a: Array, mu: Array, tau: Array, kernel: Callable = calls.march) -> tuple[Array, Array]:
     """The kernel of this project, to the end of the cable."""
     rows = len(a)
     ends, folds = np.empty((rows, END_COLUMNS)), np.empty((rows, 1, FOLD_COLUMNS))
@@ -60,7 +61,7 @@ def march_of_order(order: int, truncation: float = steppers.TRUNCATION) -> Calla
         source = source.replace(old, new)
     module.__dict__["taylor_step"] = step
     exec(compile(source, f"<march of order {order}>", "exec"), module.__dict__)
-    return module.__dict__["march"]
+    return opened(module.__dict__["march"])
 
 
 @numba.njit(forceinline=True, **OPTIONS)

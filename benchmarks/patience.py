@@ -25,7 +25,6 @@ from pathlib import Path
 import numpy as np
 
 from towatlas.effort import SECONDS
-from towatlas.kernels import notice
 
 DATA = Path(__file__).parent.parent / "docs" / "data" / "patience.csv.gz"
 ROOT = Path(__file__).parent.parent
@@ -250,7 +249,7 @@ def run_case(case: Case, folder: Path) -> Run:
     (folder / "scene.toml").write_text(case.scene)
     arguments = [str(folder / word) if (folder / word).is_file() else word for word in case.arguments]
     out, err = io.StringIO(), io.StringIO()
-    began = time.process_time() - notice.compilation_seconds()
+    began = time.process_time()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
             code = main(arguments)
@@ -259,7 +258,7 @@ def run_case(case: Case, folder: Path) -> Run:
         except Exception as error:
             code = TRACEBACK
             print(f"{type(error).__name__}: {error}", file=err)
-    seconds = time.process_time() - notice.compilation_seconds() - began
+    seconds = time.process_time() - began
     said = [line for line in err.getvalue().splitlines() if "compiling, once" not in line and "usage:" not in line]
     # Which numbers it was is in the arguments, or follows from the seed.
     message = next((line for line in said if "rror" in line), said[0] if said else "")[:200] if code else ""

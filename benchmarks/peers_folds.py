@@ -6,6 +6,7 @@ import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
 from scipy.optimize import root
 
+from towatlas.kernels.compiling import opened
 from towatlas.kernels.folds import _first_guess
 from towatlas.limits import excess_length
 
@@ -23,7 +24,7 @@ class OutOfPatienceError(Exception):
 
 def guess(n: int, w_f: float, lam: float) -> tuple[float, float]:
     """The closed-form guess that the direct solver of this project starts from: (log a, log gamma)."""
-    return _first_guess(lam, w_f, float(excess_length(lam, w_f, n)), n)
+    return opened(_first_guess)(lam, w_f, float(excess_length(lam, w_f, n)), n)
 
 
 def _slopes(xi: Array, y: Array, parameters: Array, w_f: float, lam: float) -> Array:

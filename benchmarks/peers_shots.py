@@ -9,6 +9,7 @@ import numba
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from towatlas.kernels.compiling import opened
 from towatlas.kernels.vacuum import start
 
 Array = np.ndarray
@@ -23,7 +24,8 @@ def missing() -> list[str]:
 
 def starts(a: Array, mu: Array, tau: Array) -> Array:
     """Rows t, f, p, v, q that shots start from."""
-    found = np.array([start(*row) for row in zip(a, mu, tau, strict=True)])
+    begin = opened(start)
+    found = np.array([begin(*row) for row in zip(a, mu, tau, strict=True)])
     return np.stack([mu + found[:, 0], found[:, 1], found[:, 2], found[:, 4], found[:, 5]])
 
 

@@ -8,8 +8,7 @@ from benchmarks import methods_shots as ours
 from benchmarks import peers_shots as peers
 from benchmarks.samples import ShotReference, shot_reference
 from benchmarks.timing import Row, once, seconds
-from towatlas.kernels.scan import forward_shots
-from towatlas.kernels.steppers import ORDER
+from towatlas.kernels.calls import ORDER, forward_shots
 
 REFERENCE_METHOD = "Taylor, this project"
 

@@ -12,9 +12,14 @@ from benchmarks import methods_shots as methods
 from benchmarks import peers_folds
 from benchmarks.samples import shots
 from benchmarks.timing import Row, once, processor, seconds, versions
-from towatlas.kernels.lanes import END_COLUMNS, FOLD_COLUMNS
-from towatlas.kernels.scan import forward_shots
-from towatlas.kernels.sweeps import forward_shots_parallel, march_parallel, solve_folds_parallel
+from towatlas.kernels.calls import END_COLUMNS, FOLD_COLUMNS, Cables, Folds, forward_shots
+from towatlas.kernels.sweeps import (
+    MOST_THREADS,
+    forward_shots_parallel,
+    limited_threads,
+    march_parallel,
+    solve_folds_parallel,
+)
 from towatlas.limits import excess_length
 from towatlas.solve.critical import solve_rows
 from towatlas.solve.fold_seeds import seed
@@ -71,7 +76,7 @@ def of_forward_shots(rows: int = 4096, segments: int = 100) -> list[Target]:
     )
     r_x0, out = -(gamma**2) * lam, [np.empty(rows) for _ in range(3)]
     threads = numba.get_num_threads()
-    numba.set_num_threads(1)
+    numba.set_num_threads(1)  # of the peer
     try:
         ours = seconds(lambda: forward_shots(lam, w_f, gamma, r_x0, segments, *out, 0, rows), 15)
         bound = seconds(lambda: methods.roots_and_divisions(lam, 4 * segments, out[1]), 15)
@@ -87,7 +92,7 @@ def of_forward_shots(rows: int = 4096, segments: int = 100) -> list[Target]:
 
 def of_threads(rows: int = 20_000) -> list[Target]:
     """Two threads over one, in sweeps."""
-    if int(numba.config.NUMBA_NUM_THREADS) < 2:  # type: ignore[attr-defined]
+    if MOST_THREADS < 2:
         return []
     a, mu, tau = shots(rows, 5)
     ends, folds = np.empty((rows, END_COLUMNS)), np.empty((rows, 1, FOLD_COLUMNS))
@@ -102,19 +107,18 @@ def of_threads(rows: int = 20_000) -> list[Target]:
         "fish-up shots": lambda: march_parallel(a, mu, tau, *orders, 10**7, ends, folds, *codes),
         "forward shots": lambda: forward_shots_parallel(lam, ones, ones, -lam, 100, *out),
         "folds": lambda: solve_folds_parallel(
-            lam, w_f, n, excess, *(column.copy() for column in guess), *folded, 10**7
+            Cables(lam, w_f, n, excess), Folds(*(column.copy() for column in guess), *folded), 10**7
         ),
         "folds with their seeds": lambda: towatlas.solve_critical(lam, w_f, n),
     }
-    found, before = [], numba.get_num_threads()
+    found = []
     for name, call in calls.items():
         times = []
         for threads in (1, 2):
-            numba.set_num_threads(threads)
-            times.append(min(seconds(call, 3) for _ in range(3)))
+            with limited_threads(threads):
+                times.append(min(seconds(call, 3) for _ in range(3)))
         wanted = None if "seeds" in name else 1.85  # the seeds are one thread's work
         found.append(Target(f"two threads over one, {name}", times[0] / times[1], wanted))
-    numba.set_num_threads(before)
     return found
 
 
@@ -135,8 +139,7 @@ def of_tables(rows: list[Row]) -> list[Target]:
 
 def of_folds(points: int = 4000, peer_points: int = 12) -> list[Target]:
     """Curves of critical speeds, seeds included, against `solve_bvp` continuing the same curves. One thread."""
-    found, before = [], numba.get_num_threads()
-    numba.set_num_threads(1)
+    found = []
     curves = [(1, 1.0), (2, 10.0), (3, 100.0)]
     lam = np.geomspace(8.0, 50.0, points)
     exact = {n: towatlas.solve_critical(lam, w_f, n) for n, w_f in curves}
@@ -164,7 +167,6 @@ def of_folds(points: int = 4000, peer_points: int = 12) -> list[Target]:
         note += f", {lost} not converged" if lost else ""
         name = f"critical speeds of curves over solve_bvp, tol {tolerance:g}"
         found.append(Target(name, theirs / ours, None, note))
-    numba.set_num_threads(before)
     return found
 
 

@@ -32,8 +32,8 @@ from math import sqrt
 
 import numpy as np
 
+from towatlas.kernels.calls import ORDER
 from towatlas.kernels.compiling import helper
-from towatlas.kernels.steppers import ORDER
 from towatlas.kernels.system import B_S, C_F, C_S, C_T, LAM, M_F, W_F, C, W
 from towatlas.kernels.vector import LANES, absolute, broadcast, load, square_root, store, where_less
 
@@ -52,7 +52,6 @@ R, SPEED2, KAPPA, KAPPA_T, KAPPA_S, BETA, WEIGHT, FISH_WEIGHT, FISH_MASS, FISH_D
 NORMAL, TANGENTIAL, SIDE, PACE = np.arange(12, 16)
 PARAMETERS = 16
 # Rows of the result: the state without u and T, the tension, and log(rho / gamma^2), zero at an equilibrium.
-RESULT_ROWS = 8
 # Where the shot of a bare tip begins, in units of its load: an error of this size squared is forgotten on the way.
 TIP_REACH, TIP_REACH_SIDE = 1e-9, 1e-16
 # The same for a fish with drag alone, whose cable begins along the flow, where g is no series: squared it is rounding.

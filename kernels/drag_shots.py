@@ -3,11 +3,10 @@
 A shot is computed the same way in whatever lane and company: the results are the same bits in any order.
 """
 
-from typing import Any, NamedTuple
-
 import numpy as np
 
 from towatlas.kernels import status
+from towatlas.kernels.calls import ORDER, RESULT_ROWS
 from towatlas.kernels.compiling import helper, kernel
 from towatlas.kernels.drag import (
     ACROSS,
@@ -28,7 +27,6 @@ from towatlas.kernels.drag import (
     PAST_AXIS,
     QUANTITIES,
     RA,
-    RESULT_ROWS,
     RHO,
     ROUND,
     SIDE,
@@ -51,48 +49,12 @@ from towatlas.kernels.drag import (
     values,
 )
 from towatlas.kernels.drag_slopes import COUNT, advance_slopes, expand_slopes
-from towatlas.kernels.steppers import ORDER
 from towatlas.kernels.system import C_F, C_S, M_F, W_F
 from towatlas.kernels.vector import LANES, absolute, aligned, load, square_root, store
 
 EPS = 2.0**-52
 IDLE = np.int64(-1)
 SECOND = np.int64(2)
-
-
-class Shots(NamedTuple):
-    """Shots to make, a row each: radius r of the fish and speed gamma^2, lengths over g / Omega^2.
-
-    systems : shape (rows, len(COLUMNS)), as kernels.system names them. directions : the same, how the system moves with
-    the parameter among the unknowns. shares : the part of the cable to shoot over.
-    """
-
-    r: Any
-    gamma2: Any
-    systems: Any
-    directions: Any
-    shares: Any
-
-
-class Algebra(NamedTuple):
-    """A kind of jet: products, pairs and places as in `towatlas.solve.jets`, and the degree."""
-
-    products: Any
-    pairs: Any
-    places: Any
-    degree: Any
-
-
-class Reached(NamedTuple):
-    """What the shots came to: state : shape (rows, RESULT_ROWS, monomials), X, Y, h, F_x, F_y, F_z, T and
-    log(rho / gamma^2) at the end; steps made; turns : shape (rows, 2), how often the angle about the axis passed 180
-    degrees, and how often X changed its sign; statuses.
-    """
-
-    state: Any
-    steps: Any
-    turns: Any
-    statuses: Any
 
 
 @helper

@@ -6,6 +6,7 @@ side force.
 
 import numpy as np
 
+from towatlas.kernels.calls import ORDER
 from towatlas.kernels.compiling import helper
 from towatlas.kernels.drag import (
     FIRST,
@@ -36,7 +37,6 @@ from towatlas.kernels.drag import (
     Y,
     values,
 )
-from towatlas.kernels.steppers import ORDER
 from towatlas.kernels.vector import broadcast, load, square_root, store, where_less
 
 COUNT = np.int64(2)  # monomials

@@ -9,17 +9,16 @@ Hairer and Wanner, Solving Ordinary Differential Equations II, 2nd ed., IV.7, 19
 """
 
 from math import sqrt
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from towatlas.kernels import status
+from towatlas.kernels.calls import TINY
 from towatlas.kernels.compiling import helper, kernel
 from towatlas.kernels.system import B_S, C_S, C_T, LAM, C, W
 
 # X, Y, F_x, F_y, F_z.
 SIZE = 5
-TINY = 1e-40
 STAGES = 6
 GAMMA = 0.25
 # Weights of earlier stages in the state and, over the step, in the load of a stage.
@@ -52,21 +51,6 @@ def _root(a):
 def _inverse(a):
     inverse = 1.0 / a.real
     return complex(inverse, -a.imag * inverse * inverse)
-
-
-class Marched(NamedTuple):
-    """Shots on their way, a row each, in units of g / Omega^2.
-
-    states : complex, shape (rows, SIZE), marched in place. paid : cable paid out. gamma2 : speed squared. angle : of
-    the state about the axis, added to [rad]. steps, statuses : counted, set.
-    """
-
-    states: Any
-    paid: Any
-    gamma2: Any
-    angle: Any
-    steps: Any
-    statuses: Any
 
 
 @helper

@@ -5,7 +5,6 @@ import numpy as np
 from towatlas.kernels.compiling import helper, kernel
 
 LANES = 32
-SLOPES = 4  # of log a in log(excess) and log w_f, then of log gamma
 
 
 @kernel

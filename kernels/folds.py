@@ -1,13 +1,13 @@
 """From shots to critical states: the direct solution of one fold, and its closed-form first guess."""
 
 from math import exp, log, pi, sqrt
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from towatlas.kernels import status
+from towatlas.kernels.calls import END_COLUMNS, FOLD_COLUMNS
 from towatlas.kernels.compiling import helper, inlined, kernel
-from towatlas.kernels.lanes import END_COLUMNS, FOLD_COLUMNS, march
+from towatlas.kernels.lanes import march
 from towatlas.kernels.vacuum import tension
 
 EPS = 2.0**-52
@@ -108,31 +108,6 @@ def _newton_step(jac, residual0, residual1):
         (jac[0, 1] * residual1 - jac[1, 1] * residual0) / determinant,
         (jac[1, 0] * residual0 - jac[0, 0] * residual1) / determinant,
     )
-
-
-class Cables(NamedTuple):
-    """Cables whose n-th fold is asked for, arrays of shape (rows,); excess : lambda - lambda_cn."""
-
-    lam: Any
-    w_f: Any
-    n: Any
-    excess: Any
-
-
-class Folds(NamedTuple):
-    """Guesses in, solutions out, arrays of shape (rows,) but for slopes and states.
-
-    a, gamma : a row with gamma <= 0 is given a guess. slopes : shape (rows, 4), of log a in log(excess) and in log w_f,
-    then of log gamma, near the solution; nan where not known. states : shape (rows, 4), gamma, R_x0, x_f, z_f, lengths
-    over the tow radius. error : relative error estimate of gamma. statuses : codes.
-    """
-
-    a: Any
-    gamma: Any
-    slopes: Any
-    states: Any
-    error: Any
-    statuses: Any
 
 
 # What is kept of a row from round to round: unknowns log a and log gamma, the last step and its size, the residuals

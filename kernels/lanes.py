@@ -11,6 +11,7 @@ from math import sqrt
 import numpy as np
 
 from towatlas.kernels import status
+from towatlas.kernels.calls import END_COLUMNS
 from towatlas.kernels.compiling import helper, inlined, kernel
 from towatlas.kernels.steppers import taylor_step
 from towatlas.kernels.vacuum import start, tension
@@ -38,8 +39,6 @@ LANDED = 1e-5
 LANDING_LIMIT = 40
 
 # Columns of the results.
-END_COLUMNS = 6  # tau, f, p, z, v, q
-FOLD_COLUMNS = 4  # tau, f, p, z
 
 
 @inlined

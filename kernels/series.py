@@ -21,8 +21,8 @@ from math import exp, log
 import numpy as np
 
 from towatlas.kernels import status
+from towatlas.kernels.calls import ORDER, TRUNCATION
 from towatlas.kernels.compiling import helper
-from towatlas.kernels.steppers import ORDER, TRUNCATION
 
 U, T, FIRST = 0, 1, 2
 EPS = 2.0**-52

@@ -13,12 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from towatlas.kernels.calls import ORDER, TRUNCATION
 from towatlas.kernels.compiling import inlined
 from towatlas.kernels.vacuum import forward_slopes
-
-ORDER = 20
-# Bound on the last two Taylor terms over the local amplitude. Their sum with all later ones stays below rounding.
-TRUNCATION = 1e-16
 
 
 @inlined

@@ -8,8 +8,9 @@ from math import sqrt
 import numpy as np
 
 from towatlas.kernels import status
+from towatlas.kernels.calls import ORDER
 from towatlas.kernels.compiling import helper, kernel
-from towatlas.kernels.series import FIRST, ORDER, T, U, march_of, reach
+from towatlas.kernels.series import FIRST, T, U, march_of, reach
 from towatlas.kernels.vacuum import start, tension
 
 F, P, Z = range(FIRST, FIRST + 3)

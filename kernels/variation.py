@@ -24,10 +24,10 @@ nowhere else. It is an entire function, real on the real axis.
 
 from typing import Any
 
-import numba
 import numpy as np
 
 from towatlas.kernels import status
+from towatlas.kernels.calls import MOTION_ROWS, MOTION_TERMS, ORDER, TRUNCATION
 from towatlas.kernels.compiling import helper, kernel
 from towatlas.kernels.drag import (
     ACROSS,
@@ -78,7 +78,6 @@ from towatlas.kernels.drag import (
     values,
 )
 from towatlas.kernels.drag_shots import IDLE, begin_lanes, landing, past_axis
-from towatlas.kernels.steppers import ORDER, TRUNCATION
 from towatlas.kernels.system import C_F, M_F, W_F
 from towatlas.kernels.vector import LANES, aligned, broadcast, load, store
 
@@ -151,10 +150,9 @@ def _side_force() -> list[tuple[Any, ...]]:
 
 MATRICES = np.array(_matrices())
 # What is kept of a step: the tension, then the matrices P, T A and E P by rows.
-ROWS = 28
 KEPT_ROWS = np.array([T, *P.ravel(), *TA.ravel(), *EP.ravel()])
 # Orders of their series: the equations know no more.
-TERMS = np.int64(ORDER)
+TERMS = np.int64(MOTION_TERMS)
 TWO, SIX = np.int64(2), np.int64(6)
 # Of the series of P, whose entries are at most 1, at the end of a step: its last terms.
 LEFT = 1e-15
@@ -206,9 +204,9 @@ def _shorten(c, p, h, lane, reach, bound):
 def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, statuses, begin, stop):
     """Series of the coefficients along the shapes begin..stop-1, for |sigma| <= reach of each, eight side by side.
 
-    series : shape (rows, most steps, ROWS, TERMS), in the part of a step; sizes : shape (rows, most steps), of the
-    steps in tau; starts : shape (rows, 3), the length of a bare tip that is left out, whether it is bare, and the
-    largest flow along the cable over the speed of its waves.
+    series : shape (rows, most steps, MOTION_ROWS, TERMS), in the part of a step; sizes : shape (rows, most steps),
+    of the steps in tau; starts : shape (rows, 3), the length of a bare tip that is left out, whether it is bare, and
+    the largest flow along the cable over the speed of its waves.
     """
     count = np.int64(1)
     c, scratch = aligned(ALL_QUANTITIES * KEPT), aligned(QUANTITIES * KEPT)
@@ -279,7 +277,7 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
                 starts[i, 2] = max(starts[i, 2], along * c[T * KEPT * LANES + lane] ** -1.5)
                 power = 1.0
                 for k in range(TERMS):
-                    for row in range(ROWS):
+                    for row in range(MOTION_ROWS):
                         series[i, steps[i], row, k] = c[(KEPT_ROWS[row] * KEPT + k) * LANES + lane] * power
                     power *= h[lane]
                 sizes[i, steps[i]] = h[lane] * p[PACE * LANES + lane]
@@ -499,8 +497,3 @@ def evans(series, sizes, first, steps, starts, fish, drag, terms, every, shape, 
                             else:
                                 phi[place], phi[place + LANES] = value.real, value.imag
         at += count
-
-
-def threads() -> int:
-    """How many threads kernels are called from."""
-    return int(numba.get_num_threads())

@@ -9,8 +9,7 @@ import numpy as np
 
 from towatlas.builders.grids import Grid, ScanSettings
 from towatlas.cli import main
-from towatlas.kernels.lanes import END_COLUMNS, FOLD_COLUMNS, march
-from towatlas.kernels.scan import forward_shots
+from towatlas.kernels.calls import END_COLUMNS, FOLD_COLUMNS, forward_shots, march
 from towatlas.kernels.sweeps import march_parallel
 from towatlas.limits import threshold_length
 

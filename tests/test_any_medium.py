@@ -6,12 +6,12 @@ from dataclasses import astuple, replace
 from math import inf, pi, sqrt
 from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 
 import towatlas
 from towatlas.kernels import status
+from towatlas.kernels.sweeps import MOST_THREADS, limited_threads
 from towatlas.kernels.system import COLUMNS
 from towatlas.solve.drag_equilibria import solve_drag_equilibria
 from towatlas.solve.jets import jets_of
@@ -319,13 +319,9 @@ def test_shots_are_the_same_bits_in_any_order_and_company():
     for jets in (jets_of(1), jets_of(2, gamma=True)):
         plain = shoot(r, gamma, systems, jets)
         assert set(plain.status) == {status.OK}
-        threads = numba.get_num_threads()
-        for order, many in zip(orders, (1, threads, threads), strict=True):
-            numba.set_num_threads(many)
-            try:
+        for order, many in zip(orders, (1, MOST_THREADS, MOST_THREADS), strict=True):
+            with limited_threads(many):
                 ends = shoot(r[order], gamma[order], systems[order], jets)
-            finally:
-                numba.set_num_threads(threads)
             for name in vars(plain):
                 # numpy's arctan2 rounds by where in an array a number is; the rest comes from the kernel.
                 close = 1e-15 if name == "angle" else 0.0

@@ -16,7 +16,7 @@ PROBE = """
 import sys
 sys.path.insert(0, {folder!r})
 import numpy as np
-from towatlas.kernels.scan import forward_shots
+from towatlas.kernels.calls import forward_shots
 assert forward_shots.py_func.__code__.co_filename.startswith({folder!r})
 out = [np.empty(1) for _ in range(3)]
 one = np.ones(1)
@@ -93,7 +93,7 @@ def run(code, cache, **environment):
 
 SHOT = """
 import numpy as np
-from towatlas.kernels.scan import forward_shots
+from towatlas.kernels.calls import forward_shots
 one, out = np.ones(1), [np.empty(1) for _ in range(3)]
 forward_shots(one, one, one, one, 10, *out, 0, 1)
 print(repr(out[0][0]), sum(forward_shots.stats.cache_hits.values()))

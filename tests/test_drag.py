@@ -15,7 +15,8 @@ from scipy.integrate import solve_bvp, solve_ivp
 import towatlas
 from towatlas.kernels import drag as kernel
 from towatlas.kernels import status
-from towatlas.kernels.steppers import ORDER
+from towatlas.kernels.calls import ORDER
+from towatlas.kernels.compiling import opened
 from towatlas.kernels.system import COLUMNS
 from towatlas.kernels.vector import LANES, aligned
 from towatlas.report.nrl7048.page import PHOTOGRAPHS
@@ -263,15 +264,16 @@ def test_order_of_convergence_of_the_series(m):
     c, c_t, w = 0.4, 0.1, 0.8
     # Units in which gamma is 1: those of the kernel are then the report's. X, Y, h, F_x, F_y, F_z.
     state = np.array([1.2, 0.5, 0.0, 0.7, -0.9, 1.5])
-    coefficients, parameters, jets = aligned(kernel.QUANTITIES * kernel.KEPT), aligned(kernel.PARAMETERS), jets_of(0)
+    room, set_parameters, expand = map(opened, (aligned, kernel.set_parameters, kernel.expand_jets))
+    coefficients, parameters, jets = room(kernel.QUANTITIES * kernel.KEPT), room(kernel.PARAMETERS), jets_of(0)
     table = coefficients.reshape(kernel.QUANTITIES, kernel.KEPT, LANES)
     system = System(5.0, 1.0, 1.0, C=c, w=w, C_t=c_t).row()
     for lane in range(LANES):
-        kernel.set_parameters(parameters, lane, 1.0, 1.0, system, np.zeros_like(system), jets.places, 1)
+        set_parameters(parameters, lane, 1.0, 1.0, system, np.zeros_like(system), jets.places, 1)
     table[kernel.X : kernel.STATE, 0] = state[:, None]
     groups = np.full(kernel.GROUPS, True)
     groups[kernel.ON_SIDE] = False
-    kernel.expand_jets(coefficients, parameters, jets.products, jets.pairs, 1, groups)
+    expand(coefficients, parameters, jets.products, jets.pairs, 1, groups)
 
     def slopes(sigma, y):
         down = np.concatenate([y[:2], [-y[2]], y[3:]])

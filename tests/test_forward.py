@@ -8,7 +8,9 @@ from helpers import boundary_error, root_near
 from hypothesis import given
 from hypothesis import strategies as st
 
-from towatlas.kernels.scan import forward_shots
+from towatlas.kernels.calls import forward_shots
+from towatlas.kernels.compiling import opened
+from towatlas.kernels.steppers import rk4_forward
 from towatlas.kernels.sweeps import forward_shots_parallel
 
 # NRL Report 7048, Eqs. after (36): the median roots of the system of Fig. 16, all digits as printed there, and the
@@ -42,12 +44,11 @@ def test_fourth_order(w_f):
 
 def test_mirror():
     """(x, R_x) -> (-x, -R_x) is a symmetry: E is odd, shown by the difference of two shots about x = 1 to -1."""
-    from towatlas.kernels.steppers import rk4_forward
-
+    step = opened(rk4_forward)
     right, left = (1.0, 3.0), (-1.0, -3.0)
     for k in range(50):
-        right = rk4_forward(*right, 7.0 - 0.1 * k, 1.7, 0.1)
-        left = rk4_forward(*left, 7.0 - 0.1 * k, 1.7, 0.1)
+        right = step(*right, 7.0 - 0.1 * k, 1.7, 0.1)
+        left = step(*left, 7.0 - 0.1 * k, 1.7, 0.1)
     assert left == (-right[0], -right[1])
 
 

@@ -9,7 +9,6 @@ import sys
 from functools import cache
 from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 import reference_drag
@@ -18,9 +17,8 @@ from numpy.polynomial import chebyshev
 
 import towatlas
 from towatlas.kernels import status
-from towatlas.kernels.fold_predictor import seed_folds
-from towatlas.kernels.folds import Cables, Folds, solve_folds
-from towatlas.kernels.scan import forward_shots, scan_system
+from towatlas.kernels.calls import Cables, Folds, forward_shots, scan_system, seed_folds, solve_folds
+from towatlas.kernels.native import INTERPRETED
 from towatlas.kernels.sweeps import forward_shots_parallel, scan_systems_parallel, solve_folds_parallel
 from towatlas.limits import excess_length, long_cable, massless_cable
 from towatlas.solve.jets import jets_of
@@ -32,7 +30,6 @@ from towatlas.solve.shots import shoot as shoot_drag
 from towatlas.system import System
 
 EPS = 2.0**-52
-INTERPRETED = bool(numba.config.DISABLE_JIT)
 
 # a, mu, tau of shots: a bare tip, a shot that ends within its series, a light and a heavy fish.
 SHOTS = np.array([[0.7, 0.0, 12.0], [2.0, 0.0, 1e-6], [0.8, 1e-11, 6.0], [3.0, 5.0, 40.0], [20.0, 900.0, 60.0]]).T
@@ -65,7 +62,7 @@ def folds_of(lam, w_f, n, parallel=False):
     cables = Cables(lam, w_f, n, excess_length(lam, w_f, n))
     folds = Folds(a, gamma, slopes, np.empty((rows, 4)), np.empty(rows), np.empty(rows, np.int64))
     if parallel:
-        solve_folds_parallel(*cables, *folds, 10**7)
+        solve_folds_parallel(cables, folds, 10**7)
     else:
         solve_folds(cables, folds, 10**7, 0, rows)
     assert set(folds.statuses) == {status.OK}

@@ -5,7 +5,7 @@ import pytest
 
 import towatlas
 from towatlas.kernels import status
-from towatlas.kernels.scan import scan_system
+from towatlas.kernels.calls import scan_system
 from towatlas.limits import excess_length
 
 N_MAX = 4

@@ -1,12 +1,12 @@
 """Guesses of a table of folds from a few of them."""
 
-import numba
 import numpy as np
 import pytest
 from helpers import random_cables
 
 import towatlas.solve.fold_seeds
 from towatlas.kernels import status
+from towatlas.kernels.sweeps import limited_threads
 from towatlas.limits import excess_length
 from towatlas.solve.critical import solve_rows
 
@@ -69,9 +69,8 @@ def test_a_misleading_seed_does_no_harm(monkeypatch):
 def test_threads_do_not_matter():
     columns = dict(zip(("n", "w_f", "lam", "excess"), _curve(3000), strict=True))
     results = []
-    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
-        numba.set_num_threads(threads)
-        results.append(solve_rows(**columns))
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+    for threads in (1, 2):
+        with limited_threads(threads):
+            results.append(solve_rows(**columns))
     for name, column in results[0].items():
         np.testing.assert_array_equal(column, results[1][name])

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import towatlas
+from towatlas.kernels.compiling import opened
 from towatlas.kernels.steppers import rk4_forward
 from towatlas.plot.shape import plot_shape
 from towatlas.tables.seal import read_sealed
@@ -51,13 +52,13 @@ def test_against_34_digits(lam, w_f, gamma, root):
 def test_forward_shot_follows_the_shape():
     """Skop's forward shot from R_x0 passes through every point; its error falls with the fourth power of the step."""
     lam, w_f, gamma = 12.0, 5.0, 1.1
-    misses = []
+    misses, step = [], opened(rk4_forward)
     for segments in (200, 800):
         curve = towatlas.shape(lam, w_f, gamma, s=np.linspace(0, lam, segments + 1))
         x, force, path = 1.0, float(curve.R_x[0]), [1.0]
         for k in range(segments):
             below = w_f + lam * (segments - k) / segments
-            x, force = rk4_forward(x, force, below, gamma**2, lam / segments)
+            x, force = step(x, force, below, gamma**2, lam / segments)
             path.append(x)
         misses.append(np.abs(curve.x.values - path).max())
     assert misses[1] < misses[0] / 200

@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from towatlas.kernels import status
+from towatlas.kernels.compiling import opened
 from towatlas.kernels.steppers import make_taylor_step
+from towatlas.kernels.sweeps import limited_threads
 
 EPS = 2.0**-52
 
@@ -116,8 +118,7 @@ def test_count_and_folds_agree():
 @pytest.mark.parametrize("order", [4, 8, 12])
 def test_order_of_the_taylor_step(order):
     """Halving a forced step divides the error of one step by 2^(order + 1)."""
-    step = make_taylor_step(order)
-    exact_step = make_taylor_step(28)
+    step, exact_step = opened(make_taylor_step(order)), opened(make_taylor_step(28))
     state = (3.0, 1.1, 0.7, 2.0, 0.9)
 
     def error(h):
@@ -129,17 +130,14 @@ def test_order_of_the_taylor_step(order):
 
 
 def test_threads_do_not_matter():
-    import numba
-
     rng = np.random.default_rng(8)
     a, mu, tau = 10 ** rng.uniform(-2, 3, 3000), 10 ** rng.uniform(-3, 3, 3000), 10 ** rng.uniform(-1, 3, 3000)
     serial = shoot(a, mu, tau, 1, 3)
-    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
-        numba.set_num_threads(threads)
-        parallel = shoot(a, mu, tau, 1, 3, parallel=True)
+    for threads in (1, 2):
+        with limited_threads(threads):
+            parallel = shoot(a, mu, tau, 1, 3, parallel=True)
         for name in ("tau", "f", "p", "z", "v", "q", "folds", "count", "status"):
             np.testing.assert_array_equal(getattr(serial, name), getattr(parallel, name))
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
 
 
 @pytest.mark.parametrize(

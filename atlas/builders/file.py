@@ -9,12 +9,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 import xarray as xr
 from tqdm import tqdm
 
-from towatlas.kernels.compiling import source_hash
+from towatlas.kernels import sweeps
+from towatlas.kernels.native import source_hash
 from towatlas.tables.file import SCHEMA_VERSION
 from towatlas.tables.seal import BLANK_SEAL, AtlasFileError, written_in_place
 
@@ -71,16 +71,10 @@ def limited_threads(count: int | None) -> Iterator[None]:
     ValueError
         For more than there are, and less than 1.
     """
-    before = numba.get_num_threads()
-    limit = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-    if count is not None:
-        if not 1 <= count <= limit:
-            raise ValueError(f"threads must be 1 to {limit} on this machine, got {count}")
-        numba.set_num_threads(count)
-    try:
+    if count is not None and not 1 <= count <= sweeps.MOST_THREADS:
+        raise ValueError(f"threads must be 1 to {sweeps.MOST_THREADS} on this machine, got {count}")
+    with sweeps.limited_threads(count or sweeps.threads()):
         yield
-    finally:
-        numba.set_num_threads(before)
 
 
 def progress_bar(total: int, unit: str, wanted: bool) -> tqdm:

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import numba
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from tqdm import tqdm
 from towatlas.builders.grids import ScanSettings
 from towatlas.cf import plain_table, variable
 from towatlas.kernels import status
-from towatlas.kernels.sweeps import scan_systems_parallel
+from towatlas.kernels.sweeps import scan_systems_parallel, threads
 from towatlas.limits import unchecked_excess_length, unchecked_threshold_length
 from towatlas.solve.critical import solve_rows
 
@@ -30,7 +29,7 @@ def _scan_grid(scan: ScanSettings, bar: tqdm, label: str) -> tuple[Array, NDArra
     # No fold lies below the resonance of a pendulum as long as the cable, gamma^2 lambda = 1.
     low = 0.95 / np.sqrt(lam)
     high = np.full(w_f.size, scan.gamma_max)
-    block = 8 * numba.get_num_threads()
+    block = 8 * threads()
     for begin in range(0, w_f.size, block):
         part = slice(begin, begin + block)
         scan_systems_parallel(

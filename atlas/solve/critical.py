@@ -44,7 +44,7 @@ def solve_rows(
     dict of ndarray, shape (rows,)
         gamma, R_x0, x_f, z_f, tension, error, status. nan where status is not OK.
     """
-    from towatlas.kernels.folds import Cables, Folds, solve_folds
+    from towatlas.kernels.calls import Cables, Folds, solve_folds
     from towatlas.kernels.sweeps import solve_folds_parallel
 
     rows = len(n)
@@ -55,7 +55,7 @@ def solve_rows(
     states = np.empty((rows, 4))
     error = np.empty(rows)
     codes = np.empty(rows, np.int64)
-    # Copies, because broadcast views are read-only, and numba would compile the kernel anew for those.
+    # Kernels take whole arrays, not broadcast views.
     columns = [np.array(column, order="C") for column in (lam, w_f, n, excess)]
     solved = a, gamma, slopes, states, error, codes
     max_steps = scaled(STEPS, MOST_STEPS)
@@ -66,7 +66,7 @@ def solve_rows(
         check_patience("critical states", REMEDY, done=part.start, of=rows)
         some, into = [column[part] for column in columns], [column[part] for column in solved]
         if len(some[0]) >= PARALLEL_FROM:
-            solve_folds_parallel(*some, *into, max_steps)
+            solve_folds_parallel(Cables(*some), Folds(*into), max_steps)
         else:
             solve_folds(Cables(*some), Folds(*into), max_steps, 0, len(some[0]))
     with np.errstate(over="ignore"):

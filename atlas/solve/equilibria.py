@@ -174,7 +174,7 @@ def branch_names(nodes: Integers, outer: NDArray[np.bool_]) -> NDArray[np.str_]:
 
 def _boundary_errors(system: System, gamma: float, r_x0: Array) -> Array:
     """E of Eq. (33) of forward shots: an independent witness."""
-    from towatlas.kernels.scan import forward_shots
+    from towatlas.kernels.calls import forward_shots
 
     rows = len(r_x0)
     errors, x_end, r_x_end = np.empty(rows), np.empty(rows), np.empty(rows)

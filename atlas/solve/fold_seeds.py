@@ -65,7 +65,7 @@ def seed(
 
 def _seed_one(n: int, w_f: Array, excess: Array, solve: Callable) -> tuple[Array, Array, Array] | None:
     """Guesses and slopes for rows of one n; None where no box of nodes pays or one of its nodes fails."""
-    from towatlas.kernels.fold_predictor import SLOPES, seed_folds
+    from towatlas.kernels.calls import SLOPES, seed_folds
 
     x, y = np.log(excess), np.log1p(w_f / W_SCALE)
     span = _box(x, y)

@@ -97,7 +97,7 @@ def look_stiffly(r: Array, gamma: Array, systems: Array) -> Looks:
     -------
     Looks
     """
-    from towatlas.kernels.drag_stiff import TINY, Marched
+    from towatlas.kernels.calls import TINY, Marched
     from towatlas.kernels.sweeps import shoot_stiff_threads
 
     systems, gamma = systems.copy(), gamma.copy()

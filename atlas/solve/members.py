@@ -93,7 +93,7 @@ def shoot_lanes(a: Array, mu: Array, tau: Array) -> tuple[Array, Integers, Integ
     ndarray of int, shape (rows,)
         Statuses.
     """
-    from towatlas.kernels.lanes import FOLD_COLUMNS, march
+    from towatlas.kernels.calls import FOLD_COLUMNS, march
     from towatlas.kernels.sweeps import march_parallel
 
     def shoot(max_steps: int, a: Array, mu: Array, tau: Array, *results: NDArray) -> None:
@@ -121,7 +121,7 @@ def shoot_singly(a: Array, mu: Array, tau: Array) -> tuple[Array, Integers, Inte
     tuple of ndarray
         As of `shoot_lanes`.
     """
-    from towatlas.kernels.vacuum_single import shoot_each
+    from towatlas.kernels.calls import shoot_each
 
     def shoot(max_steps: int, a: Array, mu: Array, tau: Array, *results: NDArray) -> None:
         shoot_each(a, mu, tau, max_steps, *results)

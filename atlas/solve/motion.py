@@ -124,11 +124,11 @@ class Motions:
         values : ndarray of complex, shape (points,)
         logs : ndarray, shape (points,)
         """
-        from towatlas.kernels.variation import TERMS, evans
+        from towatlas.kernels.calls import MOTION_TERMS, evans
 
         sigma = np.ascontiguousarray(sigma, np.complex128)
         values, logs = np.empty(len(sigma), np.complex128), np.empty(len(sigma))
-        terms, every = (ROUGH_TERMS, ROUGH_EVERY) if rough else (TERMS, 1)
+        terms, every = (ROUGH_TERMS, ROUGH_EVERY) if rough else (MOTION_TERMS, 1)
         of_shapes = self.series, self.sizes, self.first, self.steps, self.starts, self.fish, self.drag
 
         def some(part: slice) -> None:
@@ -189,15 +189,14 @@ def motions(
 
 
 def _side_by_side(r_f: Array, gamma: Array, systems: Array, reach: Array, bound: float) -> list[Motion]:
-    from towatlas.kernels.drag_shots import Algebra, Shots
-    from towatlas.kernels.variation import ROWS, TERMS, expand_shapes
+    from towatlas.kernels.calls import MOTION_ROWS, MOTION_TERMS, Algebra, Shots, expand_shapes
 
     rows, gamma2 = len(r_f), np.square(gamma)
     algebra = Algebra(*jets_of(0).algebra)
     shots = Shots(r_f * gamma2, gamma2, systems, np.zeros_like(systems), np.ones(rows))
     room = ROOM
     while True:
-        series, sizes = np.empty((rows, room, ROWS, TERMS)), np.empty((rows, room))
+        series, sizes = np.empty((rows, room, MOTION_ROWS, MOTION_TERMS)), np.empty((rows, room))
         starts, steps, codes = np.empty((rows, 3)), np.empty(rows, np.int64), np.empty(rows, np.int64)
         expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, codes, 0, rows)
         room *= 8

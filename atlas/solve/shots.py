@@ -101,9 +101,7 @@ def shoot(
     its mirror image in z hangs down, and a turn to port is one to starboard seen in a mirror. The side force changes
     its sign in both.
     """
-    from towatlas.kernels.drag import RESULT_ROWS
-    from towatlas.kernels.drag_shots import Algebra, Reached, Shots
-    from towatlas.kernels.steppers import TRUNCATION
+    from towatlas.kernels.calls import RESULT_ROWS, TRUNCATION, Algebra, Reached, Shots
     from towatlas.kernels.sweeps import shoot_drag_threads
 
     r = np.array(r, float, ndmin=1)

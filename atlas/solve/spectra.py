@@ -118,7 +118,7 @@ def growth_columns(
     dict of ndarray, shape (systems, shapes)
         FIELDS.
     """
-    from towatlas.kernels.variation import threads
+    from towatlas.kernels.sweeps import threads
 
     missing: dict[str, Any] = {
         "growth": np.nan,

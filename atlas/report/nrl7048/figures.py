@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from towatlas.kernels.scan import forward_shots, reaction_bounds
+from towatlas.kernels.calls import forward_shots
 from towatlas.limits import threshold_length
 from towatlas.nomenclature import EQUILIBRIUM, SYMBOLS
 from towatlas.plot.critical import LIMIT, STYLES
@@ -55,8 +55,8 @@ class Cable:
     @property
     def bounds(self) -> tuple[float, float]:
         """Lower and upper bound of R_x0, Eq. (35)."""
-        low, high = reaction_bounds(self.lam, self.w_f)
-        return low * self.gamma**2, high * self.gamma**2
+        square, lam, w_f = 0.5 * self.lam**2, self.lam, self.w_f
+        return -(square + lam * (w_f - 1.0) - w_f) * self.gamma**2, (square + lam * (w_f + 1.0) + w_f) * self.gamma**2
 
     def boundary_errors(self, r_x0: Array, segments: int) -> Array:
         """E of Eq. (33) for each R_x0, by fourth-order Runge-Kutta.

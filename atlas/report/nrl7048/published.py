@@ -108,7 +108,7 @@ def rk4_root(*, lam: float, w_f: float, gamma: float, guess: float, segments: in
     -------
     float
     """
-    from towatlas.kernels.scan import forward_shots
+    from towatlas.kernels.calls import forward_shots
 
     def boundary_error(r_x0: float) -> float:
         cable = (np.array([value]) for value in (lam, w_f, gamma, r_x0))

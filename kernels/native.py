@@ -1,0 +1,254 @@
+"""Kernels called as machine code: no numba in the process that asks, a compiler beside it where there is no code yet.
+
+numba takes 0.7 s of every process before the first kernel has run, most of it for its own tables. What it makes of a
+kernel is an object file, though, which llvmlite loads in a millisecond. So kernels are compiled in a process of their
+own (`kernels.building`), once, and kept. The folder they are kept in carries a hash of all kernel sources, the version
+of numba and the processor, so that any change of these starts an empty one; each file begins with the SHA-256 of the
+rest, and one that does not fit is thrown away.
+"""
+
+import atexit
+import ctypes
+import hashlib
+import importlib
+import importlib.metadata
+import json
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm
+import numpy as np
+
+from towatlas.kernels import notice
+
+SOURCE_FOLDER = Path(__file__).parent
+STALE_AFTER = 30 * 86400.0  # s; code of other sources or versions unused for this long is deleted
+DIGEST_BYTES = hashlib.sha256().digest_size
+# One letter a kind of number, of scalars and of the entries of arrays.
+DTYPES = {"f": np.dtype(float), "i": np.dtype(np.int64), "b": np.dtype(bool), "c": np.dtype(complex)}
+# As numba passes an array: owner, owner, entries, bytes of one, data, then shape and strides.
+ARRAY = "qqqqq"
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+
+
+@cache
+def source_hash() -> str:
+    """SHA-256 of every source file of this package, names included."""
+    digest = hashlib.sha256()
+    for path in sorted(SOURCE_FOLDER.glob("*.py")):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def features() -> str:
+    """What this processor can do, as LLVM writes it; with registers of 512 bits used where it has them.
+
+    LLVM leaves half of them empty on processors that slow down for it, or once did; here they are 1.2 times faster.
+    """
+    found = llvm.get_host_cpu_features()
+    return found.flatten() + (",-prefer-256-bit" if found.get("avx512f") else "")
+
+
+@cache
+def folder() -> Path:
+    """Where the code of these sources is kept; one that is deleted at the end where nothing can be written."""
+    machine = f"{llvm.get_host_cpu_name()} {features()}"
+    key = f"{importlib.metadata.version('numba')}-{hashlib.sha256(machine.encode()).hexdigest()[:8]}"
+    try:
+        root = _root()
+        chosen = root / f"{source_hash()[:16]}-numba-{key}"
+        chosen.mkdir(parents=True, exist_ok=True)
+        if os.access(chosen, os.W_OK):
+            os.utime(chosen)
+            _delete_stale(root, chosen)
+            return chosen
+    except (OSError, RuntimeError):
+        pass
+    return _passing_folder()
+
+
+@cache
+def _passing_folder() -> Path:
+    made = tempfile.mkdtemp(prefix="towatlas-")
+    atexit.register(shutil.rmtree, made, ignore_errors=True)
+    return Path(made)
+
+
+def _root() -> Path:
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(chosen) / "towatlas"
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "towatlas"
+
+
+def _delete_stale(root: Path, but: Path) -> None:
+    for other in root.iterdir():
+        # One that another process deletes in the meantime, or a dangling link, is not ours to mind.
+        with suppress(OSError):
+            if other != but and time.time() - other.stat().st_mtime > STALE_AFTER:
+                shutil.rmtree(other, ignore_errors=True)
+
+
+def write_sealed(path: Path, content: bytes) -> None:
+    """Write code behind its digest; at once, so that nobody reads half of it."""
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(hashlib.sha256(content).digest() + content)
+        os.replace(name, path)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(name)
+        raise
+
+
+def _read_sealed(path: Path) -> bytes | None:
+    """What a file holds; None where there is none, or none that is whole."""
+    try:
+        content = path.read_bytes()
+    except IsADirectoryError:
+        content = b""
+    except OSError:
+        return None
+    if hashlib.sha256(content[DIGEST_BYTES:]).digest() == content[:DIGEST_BYTES]:
+        return content[DIGEST_BYTES:]
+    print(f"towatlas: {path} is damaged: compiling it again", file=sys.stderr)
+    with suppress(OSError):
+        shutil.rmtree(path) if path.is_dir() else path.unlink()
+    return None
+
+
+class Kernel:
+    """A kernel, by the module it is written in and its name.
+
+    arguments : a text of one or more codes, a letter of DTYPES and, for an array, its number of dimensions; or a pair
+    of a NamedTuple and the codes of its fields. Arrays are C-contiguous. Threads may call one at the same time.
+    """
+
+    def __init__(self, module: str, name: str, *arguments: str | tuple[type, str]):
+        self.module, self.name, self.arguments = module, name, arguments
+        self.codes: list[_Code] = []
+        self._grouped: list[bool] = []
+        for argument in arguments:
+            text = argument if isinstance(argument, str) else argument[1]
+            codes = [_Code(code) for code in text.split()]
+            self.codes += codes
+            self._grouped += [False] * len(codes) if argument is text else [True]
+        self._layout = "".join(code.layout for code in self.codes)
+        self._run: Callable[[bytes], int] | None = None
+        self._loading = threading.Lock()
+
+    def __call__(self, *arguments: Any) -> None:
+        """Run it. What it finds is in the arrays given."""
+        if INTERPRETED:
+            self.python(*arguments)
+            return
+        run = self._run or self._load()
+        flat: list[Any] = []
+        for group, argument in zip(self._grouped, arguments, strict=True):
+            flat.extend(argument) if group else flat.append(argument)
+        slots: list[Any] = []
+        for code, value in zip(self.codes, flat, strict=True):
+            code.place(value, slots)
+        if run(struct.pack(self._layout, *slots)) != 0:
+            raise MemoryError(f"no memory for {self.name}")
+
+    @property
+    def python(self) -> Callable[..., None]:
+        """The function that is compiled."""
+        return getattr(importlib.import_module(f"towatlas.kernels.{self.module}"), self.name)
+
+    @property
+    def symbol(self) -> str:
+        """Name of what is called, in the object file."""
+        return f"towatlas_{self.name}"
+
+    @property
+    def path(self) -> Path:
+        """The object file."""
+        return folder() / f"{self.module}.{self.name}.o"
+
+    def _load(self) -> Callable[[bytes], int]:
+        with self._loading:
+            if self._run is None:
+                code = _read_sealed(self.path)
+                if code is None:
+                    notice.compiling(self.name)
+                    code = self._build()
+                self._run = self._link(code)
+            return self._run
+
+    def _build(self) -> bytes:
+        build([self])
+        code = _read_sealed(self.path)
+        if code is None:
+            raise RuntimeError(f"the compiler left no {self.path}")
+        return code
+
+    def _link(self, code: bytes) -> Callable[[bytes], int]:
+        engine = _engine()
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+        address = engine.get_function_address(self.symbol)
+        function = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_char_p)(address)
+        # The code goes with its engine.
+        function.engine = engine  # type: ignore[attr-defined]
+        return function
+
+
+class _Code:
+    """One argument: how it is checked and passed."""
+
+    def __init__(self, text: str):
+        self.dtype, self.dimensions = DTYPES[text[0]], int(text[1:] or 0)
+        self.layout = ARRAY + "qq" * self.dimensions if self.dimensions else {"f": "d", "i": "q"}[text[0]]
+
+    def place(self, value: Any, slots: list[Any]) -> None:
+        if not self.dimensions:
+            slots.append(value)
+            return
+        if value.dtype != self.dtype or value.ndim != self.dimensions or not value.flags.c_contiguous:
+            raise TypeError(
+                f"a C-contiguous array of {self.dimensions} dimensions of {self.dtype} is needed, "
+                f"got {value.dtype} of shape {value.shape}, strides {value.strides}"
+            )
+        slots.extend((0, 0, value.size, value.itemsize, value.__array_interface__["data"][0]))
+        slots.extend(value.shape)
+        slots.extend(value.strides)
+
+
+def _engine() -> Any:
+    if llvm.llvm_version_info < (20,):
+        llvm.initialize()
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
+    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+
+
+def build(kernels: Sequence[Kernel]) -> None:
+    """Compile kernels in a process of its own and keep their code.
+
+    Raises
+    ------
+    RuntimeError
+        With what the compiler said, where it fails.
+    """
+    told = json.dumps([str(folder()), features(), [(kernel.module, kernel.name) for kernel in kernels]])
+    # It finds the package where this process did.
+    code = "import json, sys; sys.path[:] = json.loads(sys.argv[2]); from towatlas.kernels.building import main; main()"
+    command = [sys.executable, "-c", code, told, json.dumps(sys.path)]
+    done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    if done.returncode != 0:
+        raise RuntimeError(f"kernels could not be compiled:\n{done.stderr.strip()}")
