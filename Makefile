@@ -19,7 +19,8 @@ $(VENV)/installed: pyproject.toml atlas/__init__.py
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[test,bench,check]'
 	@touch $@
 
-atlas: install  ## build build/atlas.nc
+atlas: install  ## compile what is compiled once, and build build/atlas.nc
+	$(BIN)/python -m towatlas warmup
 	$(BIN)/python -m towatlas build --out $(ATLAS)
 
 equilibria: install  ## build build/equilibria.nc, the table of fish positions

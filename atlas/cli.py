@@ -14,6 +14,7 @@ from importlib import import_module
 from towatlas import __version__
 from towatlas.commands.common import FAILED, FILE, OK, USAGE, announce_compilation, say, shown_progress
 from towatlas.effort import patience
+from towatlas.kernels.notice import CompilerError
 from towatlas.tables.seal import AtlasFileError
 
 # In the order in which help lists them; each a module of towatlas.commands.
@@ -35,6 +36,7 @@ COMMANDS = (
     "plot",
     "report",
     "info",
+    "warmup",
 )
 
 
@@ -73,7 +75,7 @@ def main(arguments: list[str] | None = None) -> int:
     except ValueError as error:
         say(str(error))
         return USAGE
-    except ArithmeticError as error:
+    except (ArithmeticError, CompilerError) as error:
         say(str(error))
         return FAILED
     except MemoryError:

@@ -8,14 +8,13 @@ import importlib
 import json
 import os
 import sys
-from pathlib import Path
 from typing import Any
 
 from llvmlite import binding as llvm
 from llvmlite import ir
 
 from towatlas.kernels import calls
-from towatlas.kernels.native import DTYPES, Kernel, write_sealed
+from towatlas.kernels.native import DTYPES, Kernel
 
 BYTE, WORD, INT, DOUBLE = ir.IntType(8), ir.IntType(64), ir.IntType(32), ir.DoubleType()
 POINTER, WORDS = BYTE.as_pointer(), WORD.as_pointer()
@@ -24,12 +23,15 @@ HEAD = 6
 
 
 def main() -> None:
-    """Compile what the first argument of the process names."""
-    folder, features, names = json.loads(sys.argv[1])
+    """Compile what the first argument of the process names: sizes and object files, one after the other, on stdout."""
+    features, names = json.loads(sys.argv[1])
     os.environ["NUMBA_CPU_FEATURES"] = features
-    for module, name in names:
-        kernel = next(found for found in calls.KERNELS if (found.module, found.name) == (module, name))
-        write_sealed(Path(folder) / f"{module}.{name}.o", object_code(kernel, features))
+    with os.fdopen(os.dup(1), "wb") as out:
+        os.dup2(2, 1)  # whatever else is printed
+        for module, name in names:
+            kernel = next(found for found in calls.KERNELS if (found.module, found.name) == (module, name))
+            code = object_code(kernel, features)
+            out.write(len(code).to_bytes(8, "little") + code)
 
 
 def object_code(kernel: Kernel, features: str) -> bytes:

@@ -108,15 +108,11 @@ shoot_stiff = Kernel("drag_stiff", "shoot_stiff", (Marched, "c2 f1 f1 f1 i1 i1")
 expand_shapes = Kernel("variation", "expand_shapes", _SHOTS, _ALGEBRA, "f1 f f4 f2 f2 i1 i1 i i")
 evans = Kernel("variation", "evans", "f3 f1 i1 i1 f2 f2 b1 i i i1 c1 c1 f1 i i")
 
-KERNELS = (
-    march,
-    shoot_each,
-    seed_folds,
-    solve_folds,
-    forward_shots,
-    scan_system,
-    shoot_drag,
-    shoot_stiff,
-    expand_shapes,
-    evans,
+# What is compiled at once: the longest first, and next to each other what shares code.
+GROUPS = (
+    (shoot_drag, expand_shapes),
+    (march, solve_folds, seed_folds),
+    (shoot_each, forward_shots, scan_system),
+    (evans, shoot_stiff),
 )
+KERNELS = tuple(kernel for group in GROUPS for kernel in group)

@@ -7,7 +7,6 @@ of numba and the processor, so that any change of these starts an empty one; eac
 rest, and one that does not fit is thrown away.
 """
 
-import atexit
 import ctypes
 import hashlib
 import importlib
@@ -22,12 +21,12 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-import llvmlite.binding as llvm
 import numpy as np
 
 from towatlas.kernels import notice
@@ -40,6 +39,11 @@ DTYPES = {"f": np.dtype(float), "i": np.dtype(np.int64), "b": np.dtype(bool), "c
 # As numba passes an array: owner, owner, entries, bytes of one, data, then shape and strides.
 ARRAY = "qqqqq"
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+
+
+def _llvm() -> Any:
+    # When a kernel is called, not before: who only looks up has no use for it.
+    return importlib.import_module("llvmlite.binding")
 
 
 @cache
@@ -56,33 +60,26 @@ def features() -> str:
 
     LLVM leaves half of them empty on processors that slow down for it, or once did; here they are 1.2 times faster.
     """
-    found = llvm.get_host_cpu_features()
+    found = _llvm().get_host_cpu_features()
     return found.flatten() + (",-prefer-256-bit" if found.get("avx512f") else "")
 
 
 @cache
-def folder() -> Path:
-    """Where the code of these sources is kept; one that is deleted at the end where nothing can be written."""
-    machine = f"{llvm.get_host_cpu_name()} {features()}"
+def folder() -> Path | None:
+    """Where the code of these sources is kept; None where nothing can be written."""
+    machine = f"{_llvm().get_host_cpu_name()} {features()}"
     key = f"{importlib.metadata.version('numba')}-{hashlib.sha256(machine.encode()).hexdigest()[:8]}"
     try:
         root = _root()
         chosen = root / f"{source_hash()[:16]}-numba-{key}"
         chosen.mkdir(parents=True, exist_ok=True)
-        if os.access(chosen, os.W_OK):
-            os.utime(chosen)
-            _delete_stale(root, chosen)
-            return chosen
+        if not os.access(chosen, os.W_OK):
+            return None
+        os.utime(chosen)
+        _delete_stale(root, chosen)
     except (OSError, RuntimeError):
-        pass
-    return _passing_folder()
-
-
-@cache
-def _passing_folder() -> Path:
-    made = tempfile.mkdtemp(prefix="towatlas-")
-    atexit.register(shutil.rmtree, made, ignore_errors=True)
-    return Path(made)
+        return None
+    return chosen
 
 
 def _root() -> Path:
@@ -100,12 +97,17 @@ def _delete_stale(root: Path, but: Path) -> None:
                 shutil.rmtree(other, ignore_errors=True)
 
 
-def write_sealed(path: Path, content: bytes) -> None:
+def digest(code: bytes) -> bytes:
+    """What a file begins with. Not of the code alone: a file of somebody else's, sealed the same way, is none of ours."""
+    return hashlib.sha256(b"towatlas kernel" + code).digest()
+
+
+def _write_sealed(path: Path, content: bytes) -> None:
     """Write code behind its digest; at once, so that nobody reads half of it."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name)
     try:
         with os.fdopen(handle, "wb") as file:
-            file.write(hashlib.sha256(content).digest() + content)
+            file.write(digest(content) + content)
         os.replace(name, path)
     except BaseException:
         with suppress(OSError):
@@ -121,12 +123,16 @@ def _read_sealed(path: Path) -> bytes | None:
         content = b""
     except OSError:
         return None
-    if hashlib.sha256(content[DIGEST_BYTES:]).digest() == content[:DIGEST_BYTES]:
+    if digest(content[DIGEST_BYTES:]) == content[:DIGEST_BYTES]:
         return content[DIGEST_BYTES:]
+    _throw_away(path)
+    return None
+
+
+def _throw_away(path: Path) -> None:
     print(f"towatlas: {path} is damaged: compiling it again", file=sys.stderr)
     with suppress(OSError):
         shutil.rmtree(path) if path.is_dir() else path.unlink()
-    return None
 
 
 class Kernel:
@@ -176,31 +182,35 @@ class Kernel:
 
     @property
     def path(self) -> Path:
-        """The object file."""
-        return folder() / f"{self.module}.{self.name}.o"
+        """The object file, where there is a place for it."""
+        return (folder() or Path(os.devnull)) / f"{self.module}.{self.name}.o"
 
     def _load(self) -> Callable[[bytes], int]:
         with self._loading:
             if self._run is None:
                 code = _read_sealed(self.path)
-                if code is None:
+                run = None if code is None else self._link(code)
+                if code is not None and run is None:
+                    _throw_away(self.path)
+                if run is None:
                     notice.compiling(self.name)
-                    code = self._build()
-                self._run = self._link(code)
+                    run = self._link(build([self])[0])
+                if run is None:
+                    raise notice.CompilerError(f"the compiler made no code of {self.name} that can be loaded")
+                self._run = run
             return self._run
 
-    def _build(self) -> bytes:
-        build([self])
-        code = _read_sealed(self.path)
-        if code is None:
-            raise RuntimeError(f"the compiler left no {self.path}")
-        return code
-
-    def _link(self, code: bytes) -> Callable[[bytes], int]:
+    def _link(self, code: bytes) -> Callable[[bytes], int] | None:
+        """What runs an object file; None for one that is something else."""
         engine = _engine()
-        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        try:
+            engine.add_object_file(_llvm().ObjectFileRef.from_data(code))
+        except Exception:  # whatever llvmlite raises
+            return None
         engine.finalize_object()
         address = engine.get_function_address(self.symbol)
+        if not address:
+            return None
         function = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_char_p)(address)
         # The code goes with its engine.
         function.engine = engine  # type: ignore[attr-defined]
@@ -229,6 +239,7 @@ class _Code:
 
 
 def _engine() -> Any:
+    llvm = _llvm()
     if llvm.llvm_version_info < (20,):
         llvm.initialize()
     llvm.initialize_native_target()
@@ -237,18 +248,54 @@ def _engine() -> Any:
     return llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
 
 
-def build(kernels: Sequence[Kernel]) -> None:
-    """Compile kernels in a process of its own and keep their code.
+def warm(groups: Sequence[Sequence[Kernel]], done: Callable[[Kernel], object]) -> None:
+    """Compile what is not yet, two groups at a time; `done` hears of each kernel that is there.
 
     Raises
     ------
-    RuntimeError
+    notice.CompilerError
+        Where the compiler fails.
+    OSError
+        Where there is no place to keep the code.
+    """
+    if folder() is None:
+        raise OSError(
+            f"nothing can be written under {_root()}: set NUMBA_CACHE_DIR to where compiled kernels may be kept"
+        )
+
+    def some(group: Sequence[Kernel]) -> None:
+        missing = [kernel for kernel in group if _read_sealed(kernel.path) is None]
+        if missing:
+            build(missing)
+        for kernel in group:
+            done(kernel)
+
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(some, groups))
+
+
+def build(kernels: Sequence[Kernel]) -> list[bytes]:
+    """Compile kernels in a process of its own; their code, which is kept where there is a place for it.
+
+    Raises
+    ------
+    notice.CompilerError
         With what the compiler said, where it fails.
     """
-    told = json.dumps([str(folder()), features(), [(kernel.module, kernel.name) for kernel in kernels]])
+    told = json.dumps([features(), [(kernel.module, kernel.name) for kernel in kernels]])
     # It finds the package where this process did.
     code = "import json, sys; sys.path[:] = json.loads(sys.argv[2]); from towatlas.kernels.building import main; main()"
     command = [sys.executable, "-c", code, told, json.dumps(sys.path)]
-    done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL)
     if done.returncode != 0:
-        raise RuntimeError(f"kernels could not be compiled:\n{done.stderr.strip()}")
+        raise notice.CompilerError(f"kernels could not be compiled:\n{done.stderr.decode(errors='replace').strip()}")
+    made, parts = done.stdout, []
+    for kernel in kernels:
+        size = int.from_bytes(made[:8], "little")
+        parts.append(made[8 : 8 + size])
+        made = made[8 + size :]
+        if folder() is not None:
+            # On a full disk, say, it is compiled again the next time.
+            with suppress(OSError):
+                _write_sealed(kernel.path, parts[-1])
+    return parts

@@ -1,6 +1,14 @@
-"""Who is told that a kernel is being compiled: one listener."""
+"""Who is told that a kernel is being compiled: one listener. And what is raised where that fails.
+
+Cheap to import.
+"""
 
 from collections.abc import Callable
+
+
+class CompilerError(RuntimeError):
+    """Kernels could not be compiled."""
+
 
 _listener: Callable[[str], object] = str
 
