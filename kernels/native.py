@@ -98,7 +98,7 @@ def _delete_stale(root: Path, but: Path) -> None:
 
 
 def digest(code: bytes) -> bytes:
-    """What a file begins with. Not of the code alone: a file of somebody else's, sealed the same way, is none of ours."""
+    """What a file begins with: not of the code alone, for what others seal the same way is none of ours."""
     return hashlib.sha256(b"towatlas kernel" + code).digest()
 
 

@@ -48,7 +48,7 @@ def test_edges_are_those_of_the_windows_of_flutter(gamma, enters):
 
 
 def test_a_margin_counts_edges_of_flutter(capsys):
-    ask = ("scene", "skop-fig3", "--gamma", 3.2, "--model=air", "--json")
+    ask = ("scene", "skop-fig3", "--gamma", 3.2, "--model=air", "--json", "--patience", 300)
     edge = flutter_edges(answer_at(3.2)).above
     for margin, expected in ((1.01 * edge.distance, 6), (0.99 * edge.distance, 0)):
         code, out, err = run(capsys, *ask, "--margin", f"{100 * margin}%")
