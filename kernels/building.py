@@ -86,7 +86,7 @@ def _memory(module: ir.Module) -> None:
     data = builder.and_(past, builder.neg(align))
     words = builder.bitcast(head, WORDS)
     for place, value in enumerate((WORD(1), WORD(0), WORD(0), data, size, WORD(0))):
-        builder.store(value, builder.gep(words, [WORD(place)], source_etype=WORD))
+        builder.store(value, builder.gep(words, [WORD(place)]))
     builder.ret(head)
 
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [POINTER]), "NRT_MemInfo_call_dtor")
@@ -118,8 +118,8 @@ def _door(module: ir.Module, name: str, kernel: Kernel) -> None:
     places = [builder.bitcast(builder.alloca(POINTER), POINTER) for _ in range(2)]
     values = []
     for place, kind in enumerate(kinds):
-        at = builder.gep(door.args[0], [WORD(8 * place)], source_etype=BYTE)
-        word = builder.load(builder.bitcast(at, WORDS), typ=WORD)
+        at = builder.gep(door.args[0], [WORD(8 * place)])
+        word = builder.load(builder.bitcast(at, WORDS))
         if kind is POINTER:
             values.append(builder.inttoptr(word, POINTER))
         else:
