@@ -216,7 +216,7 @@ def test_extrema_fall_with_their_number():
         ratio = m[:, :-1] / m[:, 1:]
         return np.where(np.isnan(ratio), np.inf, ratio).min(axis=1)
 
-    found = differential_evolution(margin, ((-3, 4), (1, 5)), maxiter=8, popsize=8, rng=2, **BATCHES)
+    found = differential_evolution(margin, ((-3, 4), (1, 5)), maxiter=8, popsize=8, seed=2, **BATCHES)
     assert 1.0 < found.fun < 1.6
 
 
