@@ -142,7 +142,7 @@ def test_no_shot_violates_it_and_one_violates_more(statement, searched):
 @pytest.mark.parametrize("statement", STATEMENTS)
 def test_longer_attack(statement):
     k = list(STATEMENTS).index(statement)
-    found = differential_evolution(lambda x: margins(x)[k, 0], BOUNDS, maxiter=12, popsize=12, rng=1, **BATCHES)
+    found = differential_evolution(lambda x: margins(x)[k, 0], BOUNDS, maxiter=12, popsize=12, seed=1, **BATCHES)
     assert found.fun > 0.0
 
 
