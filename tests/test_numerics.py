@@ -21,6 +21,18 @@ def test_series_through_the_nodes():
     np.testing.assert_allclose(chebyshev.on_grid(series, chebyshev.nodes(7), chebyshev.nodes(10)), values, atol=1e-13)
 
 
+def test_equal_patches_are_the_series_on_their_parts():
+    series = np.random.default_rng(2).normal(size=(2, 5, 7))
+    short = chebyshev.equal_patches(series, (3, 2), 8)
+    assert short.shape == (2, 3, 2, 8, 8)
+    for row, column in ((0, 0), (1, 1), (2, 0)):
+        y, x = np.array([-1.0, -0.3, 0.9]), np.array([0.2, -0.8, 1.0])
+        whole = (y + 2 * row + 1) / 3 - 1, (x + 2 * column + 1) / 2 - 1
+        for k in range(2):
+            got = np.polynomial.chebyshev.chebval2d(y, x, short[k, row, column])
+            np.testing.assert_allclose(got, np.polynomial.chebyshev.chebval2d(*whole, series[k]), atol=1e-13)
+
+
 def test_patches_are_numpys_chebyshev_sum():
     """Patches of a series that falls as those of an atlas do, against the sum of the whole series; ends included."""
     rng = np.random.default_rng(1)
