@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import chebyshev as numpys
 
-from towatlas.numerics import chebyshev, curves, errormap
+from towatlas.numerics import chebyshev, curves, errormap, lagrange
 from towatlas.numerics.axes import LinearAxis, LogAxis, ShiftedLogAxis
 from towatlas.numerics.hermite import cubic, cubic_coefficients
 from towatlas.numerics.rows import bracket, newton, solve_systems
@@ -19,6 +19,17 @@ def test_series_through_the_nodes():
     values = np.random.default_rng(0).normal(size=(3, 7, 10))
     series = chebyshev.coefficients(values)
     np.testing.assert_allclose(chebyshev.on_grid(series, chebyshev.nodes(7), chebyshev.nodes(10)), values, atol=1e-13)
+
+
+def test_middles_of_all_cells_are_interpolated_as_points_are():
+    rng = np.random.default_rng(3)
+    axes = tuple(np.cumsum(rng.uniform(0.5, 1.5, count)) for count in (7, 8, 9))
+    values = rng.normal(size=(7, 8, 9))
+    cells = tuple(c.ravel() for c in np.indices((6, 7, 8)))
+    points = tuple(lagrange.middles(axis)[cell] for axis, cell in zip(axes, cells, strict=True))
+    for width in (2, 4, 6):
+        single = lagrange.interpolate((values,), axes, cells, points, width)[0]
+        np.testing.assert_allclose(lagrange.at_middles(values, axes, width).ravel(), single, atol=1e-13)
 
 
 def test_equal_patches_are_the_series_on_their_parts():
