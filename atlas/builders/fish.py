@@ -31,7 +31,7 @@ FIELDS = ("R_x0", "x_f", "z_f", "error", "status")
 MARGIN = 0.2
 # Beyond this error a cell is not interpolated.
 WORST_ERROR = 1e-3
-# Speeds from which the next is guessed, at most: measured, with more the guesses get worse.
+# Speeds from which the next is guessed, at most: measured, more save no shots to speak of.
 POINTS = 8
 # Of a table near machine accuracy.
 ROUNDING = 1e-11

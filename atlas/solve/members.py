@@ -65,7 +65,7 @@ class Members:
     error : ndarray, shape (rows,)
         Estimated relative error of x_f [-], > 0.
     reach : ndarray, shape (rows,)
-        Way in log a to the extremum of p next to the equilibrium, about [-]; nan where it was not asked.
+        Way in log a to the extremum of p next to the equilibrium, about [-]; nan where it is not known.
     status : ndarray of int, shape (rows,)
         Codes of `towatlas.kernels.status`.
     """
