@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 ATLAS := build/atlas.nc
 
 .DEFAULT_GOAL := help
-.PHONY: help install atlas equilibria drag test bench failures types check figures clean
+.PHONY: help install atlas seeds equilibria drag test bench failures types check figures clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
@@ -22,6 +22,9 @@ $(VENV)/installed: pyproject.toml atlas/__init__.py
 atlas: install  ## compile what is compiled once, and build build/atlas.nc
 	$(BIN)/python -m towatlas warmup
 	$(BIN)/python -m towatlas build --out $(ATLAS)
+
+seeds: atlas  ## shorten the series of build/atlas.nc into atlas/solve/fold_series.npz, which direct solutions start from
+	$(BIN)/python -m towatlas.builders.fold_series $(ATLAS)
 
 equilibria: install  ## build build/equilibria.nc, the table of fish positions
 	$(BIN)/python -m towatlas build --equilibria

@@ -8,7 +8,7 @@ import towatlas
 from benchmarks import peers_folds as peers
 from benchmarks.samples import FoldReference, cables, fold_reference
 from benchmarks.timing import LOST, Row, once, seconds
-from towatlas.kernels.calls import Cables, Folds, scan_system, solve_folds
+from towatlas.kernels.calls import SLOPES, Cables, Folds, scan_system, solve_folds
 from towatlas.limits import excess_length
 from towatlas.tables.atlas import Atlas
 
@@ -69,7 +69,7 @@ def _one_by_one(exact: FoldReference) -> Row:
 
     def solve() -> None:
         cables = Cables(exact.lam, exact.w_f, exact.n, excess)
-        guess = np.zeros(rows), np.zeros(rows), np.full((rows, 4), np.nan)
+        guess = np.zeros(rows), np.zeros(rows), np.full((rows, SLOPES), np.nan)
         folds = Folds(*guess, np.empty((rows, 4)), np.empty(rows), np.empty(rows, np.int64))
         for i in range(rows):
             solve_folds(cables, folds, 10**7, i, i + 1)

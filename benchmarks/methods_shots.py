@@ -18,7 +18,7 @@ from towatlas.kernels import calls, steppers
 from towatlas.kernels.calls import END_COLUMNS, FOLD_COLUMNS
 from towatlas.kernels.compiling import opened
 from towatlas.kernels.steppers import taylor_step
-from towatlas.kernels.vacuum import boundary_error, forward_slopes, start
+from towatlas.kernels.vacuum import boundary_error, start
 
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": {"contract"}}
 LANES = 32
@@ -232,6 +232,11 @@ def order_8(a: Array, mu: Array, tau: Array, segments: int = 0, rtol: float = 0.
     return p, q
 
 
+@numba.njit
+def _forward_slopes(x, force, below, gamma2):
+    return force / sqrt(below * below + force * force), -gamma2 * x
+
+
 @numba.njit(parallel=True)
 def scalar_forward_shots(lam, w_f, gamma, r_x0, segments, errors):
     """Skop's forward shots, one after the other in a parallel loop: what `forward_shots` is measured by."""
@@ -240,10 +245,10 @@ def scalar_forward_shots(lam, w_f, gamma, r_x0, segments, errors):
         gamma2, ds = gamma[i] * gamma[i], lam[i] / segments
         for k in range(segments):
             below = w_f[i] + (segments - k) * ds
-            x1, f1 = forward_slopes(x, force, below, gamma2)
-            x2, f2 = forward_slopes(x + 0.5 * ds * x1, force + 0.5 * ds * f1, below - 0.5 * ds, gamma2)
-            x3, f3 = forward_slopes(x + 0.5 * ds * x2, force + 0.5 * ds * f2, below - 0.5 * ds, gamma2)
-            x4, f4 = forward_slopes(x + ds * x3, force + ds * f3, below - ds, gamma2)
+            x1, f1 = _forward_slopes(x, force, below, gamma2)
+            x2, f2 = _forward_slopes(x + 0.5 * ds * x1, force + 0.5 * ds * f1, below - 0.5 * ds, gamma2)
+            x3, f3 = _forward_slopes(x + 0.5 * ds * x2, force + 0.5 * ds * f2, below - 0.5 * ds, gamma2)
+            x4, f4 = _forward_slopes(x + ds * x3, force + ds * f3, below - ds, gamma2)
             x += ds / 6.0 * (x1 + 2.0 * x2 + 2.0 * x3 + x4)
             force += ds / 6.0 * (f1 + 2.0 * f2 + 2.0 * f3 + f4)
         errors[i] = boundary_error(x, force, w_f[i], gamma2)

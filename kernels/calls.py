@@ -9,7 +9,11 @@ from towatlas.kernels.native import Kernel
 
 END_COLUMNS = 6  # tau, f, p, z, v, q
 FOLD_COLUMNS = 4  # tau, f, p, z
-SLOPES = 4  # of log a in log(excess) and log w_f, then of log gamma
+# Of a table of folds: log(a excess), log(gamma sqrt(excess)), log|R_x0|, log z_f, and their slopes in log(excess) and
+# log w_f; terms of a patch of it along each axis, one vector.
+FIELDS = 4
+SLOPES = 2 * FIELDS
+NODES = 8
 RESULT_ROWS = 8  # of Reached.state
 # Order of the Taylor steps, and the bound on their last two terms over the local amplitude: their sum with all later
 # ones stays below rounding.
@@ -33,9 +37,9 @@ class Cables(NamedTuple):
 class Folds(NamedTuple):
     """Guesses in, solutions out, arrays of shape (rows,) but for slopes and states.
 
-    a, gamma : a row with gamma <= 0 is given a guess. slopes : shape (rows, 4), of log a in log(excess) and in log w_f,
-    then of log gamma, near the solution; nan where not known. states : shape (rows, 4), gamma, R_x0, x_f, z_f, lengths
-    over the tow radius. error : relative error estimate of gamma. statuses : codes.
+    a, gamma : a row with gamma <= 0 is given a guess. slopes : shape (rows, 8), of log a in log(excess) and in log w_f,
+    then of log gamma, log|R_x0| and log z_f, near the solution; nan where not known. states : shape (rows, 4), gamma,
+    R_x0, x_f, z_f, lengths over the tow radius. error : relative error estimate of gamma. statuses : codes.
     """
 
     a: Any
@@ -98,7 +102,7 @@ class Marched(NamedTuple):
 
 march = Kernel("lanes", "march", "f1 f1 f1 i1 i1 i f2 f3 i1 i1 i i")
 shoot_each = Kernel("vacuum_single", "shoot_each", "f1 f1 f1 i f2 i1 i1")
-seed_folds = Kernel("fold_predictor", "seed_folds", "f3 f1 f1 f1 f f1 f1 f2 i i")
+seed_folds = Kernel("fold_predictor", "seed_folds", "f5 f1 f1 f1 f f1 f1 f2 i i")
 solve_folds = Kernel("folds", "solve_folds", (Cables, "f1 f1 i1 f1"), (Folds, "f1 f1 f2 f2 f1 i1"), "i i i")
 forward_shots = Kernel("scan", "forward_shots", "f1 f1 f1 f1 i f1 f1 f1 i i")
 scan_system = Kernel("scan", "scan_system", "f f f f i i i i f f2 i1")

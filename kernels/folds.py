@@ -28,6 +28,8 @@ WAVES = 4.0
 WORTHLESS = 1e-4
 # A step this small that no longer shrinks is rounding noise.
 NOISE = 1e-9
+# What a first-order correction leaves of a, R_x0 and z_f, in units of what it leaves of gamma. Measured: below 2.
+CAUTION = 4.0
 
 
 @inlined
@@ -110,6 +112,36 @@ def _newton_step(jac, residual0, residual1):
     )
 
 
+@helper
+def _gamma_slopes(fold, v, a, mu, n):
+    """Slopes of log gamma in log(excess) and log w_f along the folds, at that of a shot: exact.
+
+    At fixed t the variation in mu obeys the linear equation of that in a. Their Wronskian is constant, at the fish
+    mu a / sqrt(1 + a^2), and at a fold, where q = dp/da vanishes, v dp/dmu. So p is known to first order in mu and t.
+    """
+    tau, f, p = fold[0], fold[1], fold[2]
+    lam, w_f = tau / abs(p), mu / abs(p)
+    along_t = -f / tension(mu + tau, f)
+    along_w_f = (mu * a / (v * sqrt(1.0 + a * a)) + along_t) * mu / p
+    along_lam = along_t * tau / p
+    left = 2.0 * (1.0 - along_w_f - along_lam)
+    # Of lambda_cn, in log w_f.
+    threshold = -w_f * threshold_offset(w_f) / sqrt(1.0 + w_f * w_f)
+    share = along_lam / lam
+    return share * excess_length(lam, w_f, n) / left, (along_w_f + share * threshold) / left
+
+
+@helper
+def _correct(slopes, in_excess, in_w_f, miss0, miss1, a, state):
+    """From the fold of a shot to that of the cable asked for, to first order; returns the offset a of the fish."""
+    a *= exp(slopes[1] * miss0 - slopes[0] * miss1)
+    state[0] *= exp(in_w_f * miss0 - in_excess * miss1)
+    state[1] *= exp(slopes[5] * miss0 - slopes[4] * miss1)
+    state[2] = np.copysign(a / (state[0] * state[0]), state[2])
+    state[3] *= exp(slopes[7] * miss0 - slopes[6] * miss1)
+    return a
+
+
 # What is kept of a row from round to round: unknowns log a and log gamma, the last step and its size, the residuals
 # before it, the rounding of log gamma, and the step of differences.
 X, STEP, BEFORE = (0, 1), (2, 3), (4, 5)
@@ -190,7 +222,6 @@ def _update_jacobian(n, excess, slopes, job_mu, shot_folds, miss0, miss1, jac, w
             jac[1, column] = (near1 - miss1) / work[k, DIFFERENCE_STEP]
     elif book[k, SEEDED]:
         _jacobian_from_slopes(slopes, jac)
-        book[k, SEEDED] = 0
     else:
         _broyden(jac, work[k, STEP[0] : STEP[1] + 1], miss0, miss1, work[k, BEFORE[0] : BEFORE[1] + 1])
 
@@ -206,6 +237,7 @@ def _next_step(jac, miss0, miss1, work, book, k):
     if not last:
         near = size < NEAR and (book[k, FRESH] or size < 0.5 * work[k, SIZE])
         book[k, FRESH] = 0 if near else 1
+        book[k, SEEDED] = 1 if near and book[k, SEEDED] else 0
         work[k, SIZE] = size
         limit = min(1.0, 1.0 / size)
         work[k, BEFORE[0]], work[k, BEFORE[1]] = miss0, miss1
@@ -217,14 +249,29 @@ def _next_step(jac, miss0, miss1, work, book, k):
 
 @helper
 def _settle(n, job_a, job_mu, fold, state):
-    """The critical state read off a shot; returns gamma and what the rounding of the shot makes of it."""
+    """The critical state read off a shot; returns what the rounding of the shot makes of gamma."""
     p = abs(fold[2])
     sign = 1.0 if n % 2 == 0 else -1.0
     state[0] = sqrt(p)
     state[1] = sign * fold[1] / p
     state[2] = sign * job_a / p
     state[3] = fold[3] / p
-    return state[0], WAVES * EPS * _amplitude(fold, job_mu) / p
+    return WAVES * EPS * _amplitude(fold, job_mu) / p
+
+
+@helper
+def _settle_corrected(n, job_a, job_mu, fold, v, slopes, miss0, miss1, most, state):
+    """The critical state by a first-order correction, if what that leaves is below `most`.
+
+    Returns whether it is, the offset a, and the error of gamma: what its slopes, given and exact, differ by, which is
+    the second-order term.
+    """
+    in_excess, in_w_f = _gamma_slopes(fold, v, job_a, job_mu, n)
+    left = abs((slopes[2] - in_excess) * miss1) + abs((slopes[3] - in_w_f) * miss0)
+    if not CAUTION * left + miss0 * miss0 + miss1 * miss1 <= most:
+        return False, job_a, 0.0
+    rounding = _settle(n, job_a, job_mu, fold, state)
+    return True, _correct(slopes, in_excess, in_w_f, miss0, miss1, job_a, state), left + max(most, rounding)
 
 
 @kernel
@@ -232,8 +279,8 @@ def solve_folds(cables, folds, max_steps, begin, stop):
     """Critical states of the cables given, for rows begin..stop-1.
 
     Unknowns log a and log gamma, so that both limits of every power law are straight lines; Newton with differences
-    while far, Broyden when near. All rows not yet done make their shots together, round after round, each of at most
-    max_steps steps.
+    while far, Broyden when near. A row with good slopes takes one shot and a first-order correction. All rows not yet
+    done make their shots together, round after round, each of at most max_steps steps.
     """
     # Arrays one by one from here on: a tuple of them costs a microsecond a row to hand around.
     lam, w_f, n, excess = cables.lam, cables.w_f, cables.n, cables.excess
@@ -273,10 +320,19 @@ def solve_folds(cables, folds, max_steps, begin, stop):
                 continue
             book[k, RETREATS_MADE] = 0
             miss0, miss1 = _residual(shot_folds[j, 0], job_mu[j], work[k, X[1]], excess[i], n[i])
+            most = ROUNDINGS * work[k, ROUNDING]
+            if book[k, SEEDED]:
+                settled, a[i], left = _settle_corrected(
+                    n[i], job_a[j], job_mu[j], shot_folds[j, 0], ends[j, 4], slopes[i], miss0, miss1, most, states[i]
+                )
+                if settled:
+                    gamma[i], error[i], statuses[i] = states[i, 0], left, status.OK
+                    book[k, OPEN] = 0
+                    continue
             _update_jacobian(n[i], excess[i], slopes[i], job_mu, shot_folds, miss0, miss1, jac[k], work, book, k)
             if _next_step(jac[k], miss0, miss1, work, book, k):
                 a[i] = job_a[j]
-                gamma[i], rounding = _settle(n[i], job_a[j], job_mu[j], shot_folds[j, 0], states[i])
-                error[i] = abs(work[k, STEP[1]]) + max(ROUNDINGS * work[k, ROUNDING], rounding)
+                rounding = _settle(n[i], job_a[j], job_mu[j], shot_folds[j, 0], states[i])
+                gamma[i], error[i] = states[i, 0], abs(work[k, STEP[1]]) + max(most, rounding)
                 statuses[i] = status.OK
                 book[k, OPEN] = 0

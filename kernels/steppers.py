@@ -15,7 +15,7 @@ import numpy as np
 
 from towatlas.kernels.calls import ORDER, TRUNCATION
 from towatlas.kernels.compiling import inlined
-from towatlas.kernels.vacuum import forward_slopes
+from towatlas.kernels.vacuum import forward_slopes, inverse_root_guess
 
 
 @inlined
@@ -26,7 +26,7 @@ def rk4_forward(x, force, below, gamma2, ds):
     x2, f2 = forward_slopes(x + 0.5 * ds * x1, force + 0.5 * ds * f1, middle, gamma2)
     x3, f3 = forward_slopes(x + 0.5 * ds * x2, force + 0.5 * ds * f2, middle, gamma2)
     x4, f4 = forward_slopes(x + ds * x3, force + ds * f3, below - ds, gamma2)
-    # Times, not over: the division unit is what these shots wait for.
+    # Times, not over: the division unit would be what these shots wait for.
     sixth = ds * (1.0 / 6.0)
     return (
         x + sixth * (x1 + 2.0 * (x2 + x3) + x4),
@@ -43,12 +43,6 @@ def _log2(x):
 @inlined
 def _exp2(y):
     return np.int64((y + 1023.0) * 2.0**52).view(np.float64)
-
-
-@inlined
-def _inverse_sqrt(x):
-    # Within 4 %, from the bits again, for the same use.
-    return np.int64(np.int64(0x5FE6EB50C7B537A9) - (np.float64(x).view(np.int64) >> 1)).view(np.float64)
 
 
 def _convolution(a: str, b: str, k: int) -> str:
@@ -107,8 +101,8 @@ def taylor_source(order: int) -> str:
 
     lines += [
         "amplitude2 = p * p + f * f * inverse_r",
-        "scale_p = _inverse_sqrt(amplitude2)",
-        "scale_q = _inverse_sqrt(q * q + v * v * inverse_r)",
+        "scale_p = inverse_root_guess(amplitude2)",
+        "scale_q = inverse_root_guess(q * q + v * v * inverse_r)",
         "scale_h = inverse_r * scale_q * scale_p * amplitude2",
         *(
             f"size{k} = max(max(abs(p{k}) * scale_p, abs(H{k}) * inverse_r), "
@@ -143,7 +137,7 @@ def make_taylor_step(order: int) -> Any:
         "sqrt": sqrt,
         "_log2": _log2,
         "_exp2": _exp2,
-        "_inverse_sqrt": _inverse_sqrt,
+        "inverse_root_guess": inverse_root_guess,
         "LOG2_TRUNCATION": float(np.log2(TRUNCATION)),
     }
     # Under this file's name, so that the cache of compiled kernels has a source to look at.

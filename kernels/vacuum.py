@@ -15,6 +15,8 @@ t is v = df/da, q = dp/da with dv/dt = q, dq/dt = -t^2 v / r^3. Depth above the 
 
 from math import sqrt
 
+import numpy as np
+
 from towatlas.kernels.compiling import inlined
 
 # Below this ratio of mu to sqrt(1 + a^2) the fish is a first-order change of the bare tip: the error is its square.
@@ -24,9 +26,28 @@ TIP_REACH = 1e-5
 
 
 @inlined
+def inverse_root_guess(x):
+    """1 / sqrt(x) within 3.5 %, from the bits of x: half the exponent, and it vectorises."""
+    half = np.int64(np.float64(x).view(np.uint64) >> np.uint64(1))
+    return np.int64(np.int64(0x5FE6EB50C7B537A9) - half).view(np.float64)
+
+
+@inlined
+def inverse_root(x):
+    """1 / sqrt(x) within 1.3 units of rounding, for x from 1e-300 to 1e300, without the division unit."""
+    y = inverse_root_guess(x)
+    # What is left of x y^2 below 1, and the best cubic for its inverse root: y is then within 8.5e-7.
+    h = 1.0 - (x * y) * y
+    y = y * (0.99999918072366861 + h * (0.49999926255677759 + h * (0.37634074785891236 + h * 0.31370680847626686)))
+    # Of that the series to second order: what it leaves out is below 1e-17.
+    h = 1.0 - (x * y) * y
+    return y + y * (h * (0.5 + h * 0.375))
+
+
+@inlined
 def forward_slopes(x, force, below, gamma2):
     """Slopes of x and R_x in s, Eqs. (29a, b); `below` = w_f + lambda - s is the weight below the point."""
-    return force / sqrt(below * below + force * force), -gamma2 * x
+    return force * inverse_root(below * below + force * force), -gamma2 * x
 
 
 @inlined

@@ -149,6 +149,27 @@ def test_a_bad_guess_costs_time_only(shoot):
         np.testing.assert_allclose(again.R_x0, plain.R_x0, rtol=1e-12)
 
 
+def test_a_good_guess_takes_one_shot():
+    """Where the way to the extremum is known, within a factor of two: the same equilibria, to their errors."""
+    rng = np.random.default_rng(8)
+    w_f, lam, gamma = 10 ** rng.uniform(-2, 3, 300), 10 ** rng.uniform(0, 1.5, 300), 10 ** rng.uniform(-1, 0.5, 300)
+    cables = {"w_f": w_f, "lam": lam, "gamma": gamma, "n": np.zeros(300, int), "outer": np.zeros(300, bool)}
+    calls = []
+
+    def shoot(*shots):
+        calls.append(len(shots[0]))
+        return shoot_lanes(*shots)
+
+    plain = solve_members(**cables, shoot=shoot_lanes)
+    known = np.isfinite(plain.reach) & (plain.reach > 1e-2)
+    assert known.mean() > 0.9
+    guess = plain.a * (1 + 1e-9 * rng.uniform(-1, 1, 300))
+    again = solve_members(**cables, shoot=shoot, guess=guess, reach=2.0 * plain.reach)
+    assert calls[0] == 300
+    assert sum(calls[1:]) <= (~known).sum() * (len(calls) - 1)
+    assert (np.abs(again.x_f / plain.x_f - 1) <= again.error + plain.error).all()
+
+
 def test_forward_shots_agree():
     """E of Skop's forward shot falls with the fourth power of the step at every root, to rounding."""
     e = towatlas.equilibria(12.0, 5.0, 1.8)

@@ -17,10 +17,11 @@ from numpy.polynomial import chebyshev
 
 import towatlas
 from towatlas.kernels import status
-from towatlas.kernels.calls import Cables, Folds, forward_shots, scan_system, seed_folds, solve_folds
+from towatlas.kernels.calls import FIELDS, SLOPES, Cables, Folds, forward_shots, scan_system, seed_folds, solve_folds
 from towatlas.kernels.native import INTERPRETED
 from towatlas.kernels.sweeps import forward_shots_parallel, scan_systems_parallel, solve_folds_parallel
 from towatlas.limits import excess_length, long_cable, massless_cable
+from towatlas.solve.fold_seeds import patches_of, seed_held
 from towatlas.solve.jets import jets_of
 from towatlas.solve.looks import TOLERANCE, look_stiffly
 from towatlas.solve.members import shoot_singly
@@ -54,11 +55,11 @@ def quiet_divisions():
         yield
 
 
-def folds_of(lam, w_f, n, parallel=False):
-    """Columns gamma, R_x0, x_f, z_f, then error, of critical states solved from cold."""
+def folds_of(lam, w_f, n, parallel=False, guess=None):
+    """Columns gamma, R_x0, x_f, z_f, then error, of critical states solved from cold, or from a guess and slopes."""
     n = np.array(n, np.int64)
     rows = len(n)
-    a, gamma, slopes = np.zeros(rows), np.zeros(rows), np.full((rows, 4), np.nan)
+    a, gamma, slopes = guess or (np.zeros(rows), np.zeros(rows), np.full((rows, SLOPES), np.nan))
     cables = Cables(lam, w_f, n, excess_length(lam, w_f, n))
     folds = Folds(a, gamma, slopes, np.empty((rows, 4)), np.empty(rows), np.empty(rows, np.int64))
     if parallel:
@@ -102,12 +103,12 @@ def drag_shot(case):
 
 
 def predictor(count):
-    """Guesses and slopes from a series with random coefficients; the series, the abscissas and their spans."""
+    """Guesses and slopes from series with random coefficients; the series, the abscissas and their spans."""
     rng = np.random.default_rng(1)
-    series, span, w_scale = rng.normal(size=(2, 3, 5)), np.array([-1.0, 2.0, 0.0, 3.0]), 0.7
+    series, span, w_scale = rng.normal(size=(FIELDS, 3, 5)), np.array([-1.0, 2.0, 0.0, 3.0]), 0.7
     excess, w_f = np.exp(rng.uniform(-1, 2, count)), w_scale * np.expm1(rng.uniform(0, 3, count))
-    a, gamma, slopes = np.empty(count), np.empty(count), np.empty((count, 4))
-    seed_folds(series, w_f, excess, span, w_scale, a, gamma, slopes, 0, count)
+    a, gamma, slopes = np.empty(count), np.empty(count), np.empty((count, SLOPES))
+    seed_folds(patches_of(series, (2, 3)), w_f, excess, span, w_scale, a, gamma, slopes, 0, count)
     return series, excess, w_f, span, w_scale, a, gamma, slopes
 
 
@@ -308,12 +309,22 @@ def test_predictor_is_the_series_it_was_given():
     x = (2 * np.log(excess) - span[0] - span[1]) / (span[1] - span[0])
     y = (2 * np.log1p(w_f / w_scale) - span[2] - span[3]) / (span[3] - span[2])
     dx, dy = 2 / (span[1] - span[0]), 2 / (span[3] - span[2]) * w_f / (w_f + w_scale)
-    for field, (guess, power) in enumerate(((a, 1.0), (gamma, 0.5))):
-        c = series[field]
+    for guess, power, c in ((a, 1.0, series[0]), (gamma, 0.5, series[1])):
         np.testing.assert_allclose(np.log(guess * excess**power), chebyshev.chebval2d(y, x, c), atol=1e-13)
+    for field, power in enumerate((1.0, 0.5, 0.0, 0.0)):
+        c = series[field]
         along_x = dx * chebyshev.chebval2d(y, x, chebyshev.chebder(c, axis=1)) - power
         along_y = dy * chebyshev.chebval2d(y, x, chebyshev.chebder(c, axis=0))
         np.testing.assert_allclose(slopes[:, 2 * field : 2 * field + 2].T, [along_x, along_y], atol=1e-12)
+
+
+def test_a_fold_from_a_seed_is_the_fold_from_cold():
+    """One shot and a correction, against Newton's method: gamma, R_x0, x_f and z_f."""
+    for lam, w_f, n in CABLES.T:
+        cold = folds_of(*np.atleast_1d(lam, w_f, n))[0]
+        excess = excess_length(lam, w_f, int(n))
+        seeded = folds_of(*np.atleast_1d(lam, w_f, n), guess=seed_held(int(n), *np.atleast_1d(w_f, excess)))[0]
+        assert (np.abs(seeded / cold - 1)[:4] <= cold[4] + seeded[4]).all()
 
 
 def test_forward_shots_give_the_digits_of_1970():
@@ -376,7 +387,7 @@ def small_results():
     series, *_, a, gamma, slopes = predictor(3)
     terms = np.abs(series).sum()
     yield np.log([a, gamma]), np.full((2, 3), terms)
-    yield slopes, np.full((3, 4), terms)
+    yield slopes, np.full((3, SLOPES), terms)
     yield boundary_error(0.5, 3.0, 1.2, 4.0, 40), np.array([1.2**2 * 3.5])
 
 

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import chebyshev as numpys
 
-from towatlas.numerics import chebyshev, curves, errormap
+from towatlas.numerics import chebyshev, curves, errormap, lagrange
 from towatlas.numerics.axes import LinearAxis, LogAxis, ShiftedLogAxis
 from towatlas.numerics.hermite import cubic, cubic_coefficients
 from towatlas.numerics.rows import bracket, newton, solve_systems
@@ -19,6 +19,29 @@ def test_series_through_the_nodes():
     values = np.random.default_rng(0).normal(size=(3, 7, 10))
     series = chebyshev.coefficients(values)
     np.testing.assert_allclose(chebyshev.on_grid(series, chebyshev.nodes(7), chebyshev.nodes(10)), values, atol=1e-13)
+
+
+def test_middles_of_all_cells_are_interpolated_as_points_are():
+    rng = np.random.default_rng(3)
+    axes = tuple(np.cumsum(rng.uniform(0.5, 1.5, count)) for count in (7, 8, 9))
+    values = rng.normal(size=(7, 8, 9))
+    cells = tuple(c.ravel() for c in np.indices((6, 7, 8)))
+    points = tuple(lagrange.middles(axis)[cell] for axis, cell in zip(axes, cells, strict=True))
+    for width in (2, 4, 6):
+        single = lagrange.interpolate((values,), axes, cells, points, width)[0]
+        np.testing.assert_allclose(lagrange.at_middles(values, axes, width).ravel(), single, atol=1e-13)
+
+
+def test_equal_patches_are_the_series_on_their_parts():
+    series = np.random.default_rng(2).normal(size=(2, 5, 7))
+    short = chebyshev.equal_patches(series, (3, 2), 8)
+    assert short.shape == (2, 3, 2, 8, 8)
+    for row, column in ((0, 0), (1, 1), (2, 0)):
+        y, x = np.array([-1.0, -0.3, 0.9]), np.array([0.2, -0.8, 1.0])
+        whole = (y + 2 * row + 1) / 3 - 1, (x + 2 * column + 1) / 2 - 1
+        for k in range(2):
+            got = np.polynomial.chebyshev.chebval2d(y, x, short[k, row, column])
+            np.testing.assert_allclose(got, np.polynomial.chebyshev.chebval2d(*whole, series[k]), atol=1e-13)
 
 
 def test_patches_are_numpys_chebyshev_sum():

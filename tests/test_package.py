@@ -111,7 +111,7 @@ def test_the_wheel_holds_what_the_repository_does(wheel):
     expected = set()
     for package in SETUPTOOLS["packages"]:
         folder = ROOT / folder_of(package)
-        files = [path for kind in ("*.py", "*.toml", "*.csv", "scenes/*.toml") for path in folder.glob(kind)]
+        files = [path for kind in ("*.py", "*.toml", "*.csv", "*.npz", "scenes/*.toml") for path in folder.glob(kind)]
         expected |= {"/".join([*package.split("."), *path.relative_to(folder).parts]) for path in files}
     assert {".toml", ".csv"} < {Path(name).suffix for name in expected}
     assert expected == {name for name in inside if ".dist-info/" not in name}

@@ -97,9 +97,7 @@ def build_atlas(
     return Summary(path, f"method {method}", (*facts, *more_facts), time.perf_counter() - start)
 
 
-def _solve_grid(
-    shape: tuple[int, ...], bar: tqdm, label: str, guess: tuple[Array, Array] | None = None, **columns: NDArray[Any]
-) -> dict[str, NDArray[Any]]:
+def _solve_grid(shape: tuple[int, ...], bar: tqdm, label: str, **columns: NDArray[Any]) -> dict[str, NDArray[Any]]:
     """Solve the folds of arrays that broadcast to `shape`, one transition (first axis) at a time."""
     bar.set_description(label)
     flat = {name: np.broadcast_to(column, shape) for name, column in columns.items()}
@@ -111,7 +109,6 @@ def _solve_grid(
             w_f=rows["w_f"],
             lam=rows["lam"],
             excess=rows["excess"],
-            guess=guess and (guess[0][k].ravel(), guess[1][k].ravel()),
         )
         parts.append(part)
         bar.update(len(part["gamma"]))
@@ -176,24 +173,21 @@ def _fit_series(grid: Grid, axes: CriticalAxes, bar: tqdm) -> tuple[dict[str, Ar
     """
     orders = np.arange(1, grid.n_max + 1)[:, None, None]
 
-    def solve(
-        x: Array, y: Array, label: str, guess: tuple[Array, Array] | None = None
-    ) -> tuple[dict[str, Array], Array]:
+    def solve(x: Array, y: Array, label: str) -> dict[str, Array]:
         excess, w_f = axes.excess.value(x), axes.w_f.value(y)[:, None]
         shape = (grid.n_max, len(y), len(x))
         columns = {"n": orders, "w_f": w_f, "lam": unchecked_threshold_length(w_f, orders) + excess, "excess": excess}
-        solved = _solve_grid(shape, bar, label, guess, **columns)
+        solved = _solve_grid(shape, bar, label, **columns)
         if (solved["status"] != status.OK).any():
             raise RuntimeError("a fold inside the domain did not converge; this is a defect, please report it")
-        return {name: to_field(name, solved[name], excess) for name in FIELDS}, excess
+        return {name: to_field(name, solved[name], excess) for name in FIELDS}
 
     x, y = chebyshev.nodes(grid.series_excess), chebyshev.nodes(grid.series_w_f)
-    series = {name: chebyshev.coefficients(values) for name, values in solve(x, y, "series")[0].items()}
+    series = {name: chebyshev.coefficients(values) for name, values in solve(x, y, "series").items()}
 
     x, y = chebyshev.midpoints(grid.series_excess), chebyshev.midpoints(grid.series_w_f)
     between = {name: chebyshev.on_grid(series[name], y, x) for name in FIELDS}
-    gamma = np.exp(between["gamma"]) / np.sqrt(axes.excess.value(x))
-    exact, _ = solve(x, y, "checking", (np.exp(between["x_f"]) * gamma**2, gamma))
+    exact = solve(x, y, "checking")
     difference = np.max([np.abs(between[name] - exact[name]) for name in FIELDS], axis=0)
     measured = [worst_of_blocks(one, y[:, None], x, grid.error_blocks) for one in difference]
     return series, np.stack([stated_error(one) for one in measured])

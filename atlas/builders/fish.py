@@ -18,7 +18,7 @@ from towatlas.effort import patience
 from towatlas.kernels import status
 from towatlas.limits import W_SCALE, unchecked_excess_length
 from towatlas.numerics.errormap import SAFETY, stated_error
-from towatlas.numerics.lagrange import interpolate, middles, windows
+from towatlas.numerics.lagrange import at_middles, middles, weights, windows
 from towatlas.solve.critical import solve_rows
 from towatlas.solve.members import shoot_lanes, solve_members
 from towatlas.tables.fish import BRANCHES, CELLS, CRITICAL, WIDTHS, coordinates
@@ -31,6 +31,8 @@ FIELDS = ("R_x0", "x_f", "z_f", "error", "status")
 MARGIN = 0.2
 # Beyond this error a cell is not interpolated.
 WORST_ERROR = 1e-3
+# Speeds from which the next is guessed, at most: measured, more save no shots to speak of.
+POINTS = 8
 # Of a table near machine accuracy.
 ROUNDING = 1e-11
 
@@ -138,6 +140,8 @@ def _march_in_speed(grid: EquilibriaGrid, critical: dict[str, Array], bar: tqdm)
     gamma_c, x_fold = (critical[name].reshape(-1, cables) for name in ("gamma", "x_f"))
     branches = {name: np.zeros((len(BRANCHES), cables, speeds)) for name in FIELDS}
     nodes = np.zeros((len(BRANCHES), cables, speeds), np.int64)
+    same_before = np.zeros((len(BRANCHES), cables), np.int64)
+    reach = np.full((len(BRANCHES), cables), np.nan)
     for j, speed in enumerate(grid.gamma):
         nodes[1, :, j] = np.sum(gamma_c < speed, axis=0)
         for k in range(len(BRANCHES)):
@@ -148,9 +152,12 @@ def _march_in_speed(grid: EquilibriaGrid, critical: dict[str, Array], bar: tqdm)
                 for name in FIELDS:
                     branches[name][1, :, j] = branches[name][0, :, j]
                 unsolved = np.flatnonzero(n > 0)
-            guess = _extrapolated(np.abs(branches["x_f"][k]), grid.gamma, j)
-            if k == 1 and j > 0:
-                new = np.flatnonzero(n != nodes[1, :, j - 1])
+            # Speeds before at which the shape has the same number of nodes.
+            same = np.where(n == nodes[k, :, j - 1], np.minimum(same_before[k] + 1, POINTS), 0) if j else 0 * n
+            same_before[k] = same
+            guess = _extrapolated(np.abs(branches["x_f"][k]), grid.gamma, j, same)
+            if k == 1:
+                new = np.flatnonzero((same == 0) & (n > 0))
                 guess[new] = x_fold[n[new] - 1, new]
             members = solve_members(
                 lam=lam[unsolved],
@@ -160,7 +167,9 @@ def _march_in_speed(grid: EquilibriaGrid, critical: dict[str, Array], bar: tqdm)
                 outer=np.zeros(len(unsolved), bool),
                 shoot=shoot_lanes,
                 guess=guess[unsolved] * speed**2,
+                reach=np.where(same > 0, reach[k], np.nan)[unsolved],
             )
+            reach[k, unsolved] = members.reach
             for name in FIELDS:
                 branches[name][k, unsolved, j] = getattr(members, name)
         bar.update(cables)
@@ -168,14 +177,15 @@ def _march_in_speed(grid: EquilibriaGrid, critical: dict[str, Array], bar: tqdm)
     return {name: values.reshape(shape) for name, values in (branches | {"nodes": nodes}).items()}
 
 
-def _extrapolated(x_f: Array, gamma: Array, j: int) -> Array:
-    """Guess of |x_f| at the j-th speed, as a power of it through the two speeds before; nan for the first."""
-    if j == 0:
-        return np.full(len(x_f), np.nan)
-    if j == 1:
-        return x_f[:, 0].copy()
-    share = np.log(gamma[j] / gamma[j - 1]) / np.log(gamma[j - 1] / gamma[j - 2])
-    return x_f[:, j - 1] * (x_f[:, j - 1] / x_f[:, j - 2]) ** share
+def _extrapolated(x_f: Array, gamma: Array, j: int, same: NDArray[np.int64]) -> Array:
+    """Guess of |x_f| at the j-th speed from the `same` speeds before, log|x_f| a polynomial in log(gamma)."""
+    guess = np.full(len(x_f), np.nan)
+    nodes = np.log(gamma)
+    for count in range(1, min(j, POINTS) + 1):
+        rows = np.flatnonzero(same == count)
+        shares = weights(nodes[j : j + 1], nodes, np.array([j - count]), count)[0]
+        guess[rows] = np.exp(np.einsum("rk,k->r", np.log(x_f[rows, j - count : j]), shares, optimize=False))
+    return guess
 
 
 def _between(grid: EquilibriaGrid) -> EquilibriaGrid:
@@ -210,8 +220,6 @@ def _cells(grid: EquilibriaGrid, solved: dict[str, Any], exact: dict[str, Any], 
     """How each cell is interpolated: the width of least error in its middle among those that stay on one branch."""
     axes = coordinates(lam=grid.lam, w_f=grid.w_f, gamma=grid.gamma)
     counts = tuple(len(axis) - 1 for axis in axes)
-    cells = tuple(c.ravel() for c in np.indices(counts))
-    points = tuple(middles(axis)[cell] for axis, cell in zip(axes, cells, strict=True))
     fields = {name: np.log(np.abs(solved[name])) for name in ("x_f", "z_f")}
     truth = {name: np.log(np.abs(exact[name])) for name in ("x_f", "z_f")}
     one_sheet, nodes_between = sheets
@@ -219,9 +227,9 @@ def _cells(grid: EquilibriaGrid, solved: dict[str, Any], exact: dict[str, Any], 
     error = np.full((len(BRANCHES), *counts), np.inf)
     for k in range(len(BRANCHES)):
         for trial in WIDTHS:
-            values = interpolate(tuple(fields[name][k] for name in fields), axes, cells, points, trial)
-            misses = [np.abs(value - truth[name][k].ravel()) for name, value in zip(fields, values, strict=True)]
-            miss = np.max(misses, axis=0).reshape(counts)
+            miss = np.max(
+                [np.abs(at_middles(fields[name][k], axes, trial) - truth[name][k]) for name in fields], axis=0
+            )
             usable = np.ones(counts, bool)
             if k == 1:
                 low, high = _extremes(solved["nodes"][1], counts, trial)

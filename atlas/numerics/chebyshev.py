@@ -138,6 +138,33 @@ def patches(series: Array) -> Array:
     return coefficients(values.reshape(PATCHES, PATCH_NODES, PATCHES, PATCH_NODES).swapaxes(1, 2))
 
 
+def equal_patches(series: Array, counts: tuple[int, int], terms: int) -> Array:
+    """Short series on equal parts of the unit square, from long ones.
+
+    Parameters
+    ----------
+    series : ndarray, shape (..., y degree, x degree)
+    counts : pair of int
+        Parts along y and x, >= 1.
+    terms : int
+        Of a short series along each axis, >= 2.
+
+    Returns
+    -------
+    ndarray, shape (..., *counts, terms, terms)
+        y first. The same bits for any number of threads.
+    """
+    at_y, at_x = ((np.arange(count)[:, None] * 2.0 + 1.0 + nodes(terms)).ravel() / count - 1.0 for count in counts)
+    along_y, along_x = (
+        np.ascontiguousarray(polynomials(at, degree).T)
+        for at, degree in zip((at_y, at_x), series.shape[-2:], strict=True)
+    )
+    values = np.einsum("pj,...ij->...pi", along_x, series, optimize=False)
+    values = np.einsum("...pi,qi->...qp", values, along_y, optimize=False)
+    shape = (*series.shape[:-2], counts[0], terms, counts[1], terms)
+    return coefficients(values.reshape(shape).swapaxes(-3, -2))
+
+
 def patch_sums(tables: Sequence[Mapping[int, Array]], n: NDArray[np.int64], x: Array, y: Array) -> list[Array]:
     """Values at points of several tables.
 

@@ -44,14 +44,14 @@ def solve_rows(
     dict of ndarray, shape (rows,)
         gamma, R_x0, x_f, z_f, tension, error, status. nan where status is not OK.
     """
-    from towatlas.kernels.calls import Cables, Folds, solve_folds
+    from towatlas.kernels.calls import SLOPES, Cables, Folds, solve_folds
     from towatlas.kernels.sweeps import solve_folds_parallel
 
     rows = len(n)
     if guess is None:
         a, gamma, slopes = seed(lam=lam, w_f=w_f, n=n, excess=excess, solve=solve_rows)
     else:
-        a, gamma, slopes = np.abs(guess[0]), guess[1].copy(), np.full((rows, 4), np.nan)
+        a, gamma, slopes = np.abs(guess[0]), guess[1].copy(), np.full((rows, SLOPES), np.nan)
     states = np.empty((rows, 4))
     error = np.empty(rows)
     codes = np.empty(rows, np.int64)

@@ -1,10 +1,14 @@
-"""Guesses for tables of critical states: solve a few cables from cold, interpolate the rest.
+"""Guesses for tables of critical states.
 
-The few are Chebyshev nodes of the box that the table fills in the coordinates of the atlas, one
-box for each n; they are solved the same way, from fewer still.
+Over the domain of the atlas they come from its own series, shortened, which the package brings along: within 1e-8, so
+that one shot and a first-order correction are enough. Beyond it a few cables are solved from cold and the rest
+interpolated: the few are Chebyshev nodes of the box that the table fills in the coordinates of the atlas, one box for
+each n; they are solved the same way, from fewer still.
 """
 
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,12 +20,18 @@ from towatlas.numerics import chebyshev
 
 Array = NDArray[np.float64]
 
+# Made by `make seeds` (towatlas.builders.fold_series).
+SERIES = Path(__file__).parent / "fold_series.npz"
+# Patches along each axis on which it is summed: with more, its own error is what is left.
+PATCHES = 24
 # A node costs as much as three seeded rows, and saves a row two thirds of its time.
 ROWS_A_NODE = 8
 FEWEST_ROWS = 64
 # Nodes for each e-fold that a box spans, and for any box: measured, more gain nothing.
 NODES_AN_EFOLD = 2.0
 NODES_OF_ANY = 6
+# Of a box, to a patch of the kernel's eight terms.
+NODES_A_PATCH = 3
 # On an axis along which a table hardly extends: three nodes over this width give its slope.
 FEWEST_NODES, LEAST_WIDTH = 3, 0.1
 # Where rounding of lambda is a large part of the excess length, a series through such rows would be noise.
@@ -44,11 +54,11 @@ def seed(
     -------
     a, gamma : ndarray, shape (rows,)
         Zero for rows without a guess.
-    slopes : ndarray, shape (rows, 4)
+    slopes : ndarray, shape (rows, 8)
         nan for rows without a guess.
     """
     rows = len(n)
-    a, gamma, slopes = np.zeros(rows), np.zeros(rows), np.full((rows, 4), np.nan)
+    a, gamma, slopes = np.zeros(rows), np.zeros(rows), np.full((rows, 8), np.nan)
     if rows < FEWEST_ROWS:
         return a, gamma, slopes
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -56,17 +66,93 @@ def seed(
         sound &= (excess > 0.0) & (lam < MOST_ROUNDING * excess)
     for order in np.unique(n[sound]):
         group = np.flatnonzero(sound & (n == order))
-        if len(group) >= FEWEST_ROWS:
-            found = _seed_one(int(order), w_f[group], excess[group], solve)
+        if len(group) < FEWEST_ROWS:
+            continue
+        held = _held(int(order), w_f[group], excess[group])
+        inside, beyond = group[held], group[~held]
+        if len(inside):
+            a[inside], gamma[inside], slopes[inside] = seed_held(int(order), w_f[inside], excess[inside])
+        if len(beyond) >= FEWEST_ROWS:
+            found = _seed_box(int(order), w_f[beyond], excess[beyond], solve)
             if found is not None:
-                a[group], gamma[group], slopes[group] = found
+                a[beyond], gamma[beyond], slopes[beyond] = found
     return a, gamma, slopes
 
 
-def _seed_one(n: int, w_f: Array, excess: Array, solve: Callable) -> tuple[Array, Array, Array] | None:
-    """Guesses and slopes for rows of one n; None where no box of nodes pays or one of its nodes fails."""
+@cache
+def _domain() -> tuple[int, Array, Array]:
+    """Of the series of the package: highest n; lowest and highest excess length, and w_f."""
+    with np.load(SERIES) as file:
+        return len(file["n"]), file["excess"], file["w_f"]
+
+
+def _held(n: int, w_f: Array, excess: Array) -> NDArray[np.bool_]:
+    n_max, (low, high), (_, heaviest) = _domain()
+    return (n <= n_max) & (excess >= low) & (excess <= high) & (w_f <= heaviest)
+
+
+@cache
+def _held_patches(n: int) -> tuple[Array, Array]:
+    """The series of the package for one n, on patches, and its span in x and y."""
+    with np.load(SERIES) as file:
+        series = file[f"series_{n}"]
+    _, excess, w_f = _domain()
+    return patches_of(series, (PATCHES, PATCHES)), np.concatenate([np.log(excess), np.log1p(w_f / W_SCALE)])
+
+
+def patches_of(series: Array, counts: tuple[int, int]) -> Array:
+    """Series of all fields on patches, as `towatlas.kernels.fold_predictor.seed_folds` takes them.
+
+    Parameters
+    ----------
+    series : ndarray, shape (4, y degree, x degree)
+    counts : pair of int
+        Patches along y and x, >= 1.
+
+    Returns
+    -------
+    ndarray, shape (*counts, 4, 8, 8)
+        x degree first; at an address from which vectors are loaded whole.
+    """
+    from towatlas.kernels.calls import FIELDS, NODES
+
+    short = chebyshev.equal_patches(series, counts, NODES).transpose(1, 2, 0, 4, 3)
+    room = np.empty(counts[0] * counts[1] * FIELDS * NODES**2 + NODES)
+    first = -(room.ctypes.data // room.itemsize) % NODES
+    whole = room[first : first + short.size].reshape(short.shape)
+    whole[:] = short
+    return whole
+
+
+def _summed(patches: Array, span: Array, w_f: Array, excess: Array) -> tuple[Array, Array, Array]:
     from towatlas.kernels.calls import SLOPES, seed_folds
 
+    rows = len(w_f)
+    a, gamma, slopes = np.empty(rows), np.empty(rows), np.empty((rows, SLOPES))
+    seed_folds(patches, w_f, excess, span, W_SCALE, a, gamma, slopes, 0, rows)
+    return a, gamma, slopes
+
+
+def seed_held(n: int, w_f: Array, excess: Array) -> tuple[Array, Array, Array]:
+    """Guesses and slopes for rows of one n within the series of the package.
+
+    Parameters
+    ----------
+    n : int
+        Number of the transition, of those held.
+    w_f, excess : ndarray, shape (rows,)
+        Fish weight and lambda - lambda_cn [-], in the domain.
+
+    Returns
+    -------
+    a, gamma : ndarray, shape (rows,)
+    slopes : ndarray, shape (rows, 8)
+    """
+    return _summed(*_held_patches(n), w_f, excess)
+
+
+def _seed_box(n: int, w_f: Array, excess: Array, solve: Callable) -> tuple[Array, Array, Array] | None:
+    """Guesses and slopes for rows of one n; None where no box of nodes pays or one of its nodes fails."""
     x, y = np.log(excess), np.log1p(w_f / W_SCALE)
     span = _box(x, y)
     counts = _node_counts(span, len(w_f) / ROWS_A_NODE)
@@ -85,11 +171,15 @@ def _seed_one(n: int, w_f: Array, excess: Array, solve: Callable) -> tuple[Array
     if (nodes["status"] != status.OK).any():
         return None
     log_gamma = np.log(nodes["gamma"])
-    fields = np.log(np.abs(nodes["x_f"])) + 2.0 * log_gamma + np.log(node_excess), log_gamma + 0.5 * np.log(node_excess)
+    fields = (
+        np.log(np.abs(nodes["x_f"])) + 2.0 * log_gamma + np.log(node_excess),
+        log_gamma + 0.5 * np.log(node_excess),
+        np.log(-nodes["R_x0"]),
+        np.log(nodes["z_f"]),
+    )
     series = chebyshev.coefficients(np.stack([field.reshape(len(node_y), len(node_x)) for field in fields]))
-    a, gamma, slopes = np.empty(len(w_f)), np.empty(len(w_f)), np.empty((len(w_f), SLOPES))
-    seed_folds(series, w_f, excess, span, W_SCALE, a, gamma, slopes, 0, len(w_f))
-    return a, gamma, slopes
+    parts = tuple(-(-count // NODES_A_PATCH) for count in (len(node_y), len(node_x)))
+    return _summed(patches_of(series, (parts[0], parts[1])), span, w_f, excess)
 
 
 def _box(x: Array, y: Array) -> Array:

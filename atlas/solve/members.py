@@ -64,6 +64,8 @@ class Members:
         Depth of the fish over tow radius [-], 0 to lam.
     error : ndarray, shape (rows,)
         Estimated relative error of x_f [-], > 0.
+    reach : ndarray, shape (rows,)
+        Way in log a to the extremum of p next to the equilibrium, about [-]; nan where it is not known.
     status : ndarray of int, shape (rows,)
         Codes of `towatlas.kernels.status`.
     """
@@ -73,6 +75,7 @@ class Members:
     x_f: Array
     z_f: Array
     error: Array
+    reach: Array
     status: Integers
 
 
@@ -206,6 +209,7 @@ def solve_members(
     outer: NDArray[np.bool_],
     shoot: Shoot,
     guess: Array | None = None,
+    reach: Array | None = None,
 ) -> Members:
     """The inner or outer member of the n-th pair of equilibria of each row's cable; n = 0 is the one without nodes.
 
@@ -218,6 +222,9 @@ def solve_members(
     shoot : callable
     guess : ndarray, shape (rows,), optional
         Offsets a to start from, nan where there is none. A bad one costs time only.
+    reach : ndarray, shape (rows,), optional
+        That of a slightly slower cable, nan where it is not known. Twice the true one is enough to be safe; with it a
+        good guess takes one shot.
 
     Returns
     -------
@@ -239,6 +246,7 @@ def solve_members(
     # Of the shots at the two ends of each bracket: zeros of q, slope, miss.
     low_end, high_end = np.full((3, rows), np.nan), np.full((3, rows), np.nan)
     x_old, slope_old, step_old = (np.full(rows, np.nan) for _ in range(3))
+    reached = np.full(rows, np.nan)
     results = np.full((rows, 5), np.nan)
     # Products this small have lost digits to underflow, or will have.
     tiny = np.minimum(gamma2, tau) < TINY
@@ -261,14 +269,17 @@ def solve_members(
         with np.errstate(all="ignore"):
             peak, top = _tangents(n[i], low[i], low_end[:, i], high[i], high_end[:, i])
             beside = (counts == n[i]) | (counts == n[i] - 1)
-            step, reach = _step(x[i], slope, miss, side[i], here, beside, x_old[i], slope_old[i])
+            step, way = _step(x[i], slope, miss, side[i], here, beside, x_old[i], slope_old[i])
+            if round_ == 0 and reach is not None:
+                way = 0.5 * reach[i]
+            reached[i] = way
             narrow = width <= 4.0 * EPS * np.maximum(1.0, np.abs(x[i]))
             failed = statuses != status.OK
             small = here & (np.abs(step) <= LAST_STEP)
             # Two ends on one piece hold the root. Then a step that no longer shrinks is rounding.
             held = high_end[0, i] == low_end[0, i]
             noise = held & (np.abs(step) >= 0.5 * np.abs(step_old[i]))
-            landed = small & ((np.abs(step) <= CLEAR * reach) | noise) & ~failed
+            landed = small & ((np.abs(step) <= CLEAR * way) | noise) & ~failed
             held &= narrow & ~landed & ~failed
             absent = ((top < 0.0) & (width * (1 + n[i]) < CLOSE) | narrow) & ~landed & ~held & ~failed
             trial = np.where(np.isfinite(step), x[i] + step, peak)
@@ -291,7 +302,7 @@ def solve_members(
     codes[overflowed] = status.BAD_INPUT
     results[overflowed] = np.nan
     a, r_x0, x_f, z_f, error = results.T
-    return Members(a, r_x0, x_f, z_f, error, codes)
+    return Members(a, r_x0, x_f, z_f, error, reached, codes)
 
 
 def _tangents(n: Integers, low: Array, low_end: Array, high: Array, high_end: Array) -> tuple[Array, Array]:
