@@ -33,6 +33,7 @@ COMMANDS = (
     "device",
     "build",
     "plot",
+    "explore",
     "report",
     "info",
 )
