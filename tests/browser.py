@@ -23,16 +23,17 @@ def find_browser() -> str | None:
 class Page:
     """One page of a browser of its own; what goes wrong on it is in `errors`, what it asks for in `requests`."""
 
-    def __init__(self, folder: Path, width: int = 1280, height: int = 900, dark: bool = False) -> None:
+    def __init__(self, folder: Path, width: int = 1280, height: int = 900) -> None:
         browser = find_browser()
         assert browser is not None
         to_read, self._out = os.pipe()
         self._in, to_write = os.pipe()
-        # Its ends of the pipe are descriptors 3 and 4; the sandbox wants a user that is not root.
+        # Its ends of the pipe are descriptors 3 and 4, which sh sets from numbers of one digit only; the sandbox wants
+        # a user that is not root.
         options = "--headless --no-sandbox --disable-gpu --no-first-run --remote-debugging-pipe --hide-scrollbars"
         command = f'exec "$0" {options} --user-data-dir="$1" about:blank 3<&{to_read} 4>&{to_write}'
         self._process = subprocess.Popen(
-            ["/bin/sh", "-c", command, browser, str(folder / "profile")],
+            ["bash", "-c", command, browser, str(folder / "profile")],
             pass_fds=(to_read, to_write),
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -43,13 +44,24 @@ class Page:
         self.errors: list[str] = []
         self.requests: list[str] = []
         self._loaded = False
+        try:
+            self._begin(width, height)
+        except BaseException:
+            self.close()
+            raise
+
+    def _begin(self, width: int, height: int) -> None:
         target = self._send("Target.createTarget", url="about:blank")["targetId"]
         self._session = self._send("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self._send(f"{domain}.enable")
+        self.theme(False)
+        self.resize(width, height)
+
+    def theme(self, dark: bool) -> None:
+        """What the user prefers."""
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self._send("Emulation.setEmulatedMedia", features=[scheme])
-        self.resize(width, height)
 
     def resize(self, width: int, height: int) -> None:
         """A window of another size."""

@@ -7,6 +7,8 @@ const SLIDERS = [
 ];
 // Sliders move each number between a tenth and ten times that of the scene; the speed over the range of its table.
 const SPAN = 10, SPEEDS = [0.25, 2];
+// Of numbers in SI.
+const LEAST = 1e-9, LARGEST = 1e9;
 let critical = [];
 
 function element(name, attributes = {}, text = "") {
@@ -71,11 +73,12 @@ function toSlide(key) {
   return state[key] > 0 ? 500 + 500 * Math.log(state[key] / middle[key]) / Math.log(SPAN) : 0;
 }
 
+const isUsual = (key, value) => (value >= LEAST && value <= LARGEST) || (key === "fish_mass" && value === 0);
+
 /** A number typed into a box: refused in words where there is no such cable. */
 function typed(box, key, factor) {
-  const value = Number(box.value) * factor, zero = key === "fish_mass";
-  const bad = box.value.trim() === "" || !(value > 0 || (zero && value === 0)) || !Number.isFinite(value);
-  box.setCustomValidity(bad ? `A number above zero${zero ? ", or zero for no fish" : ""}.` : "");
+  const value = Number(box.value) * factor, bad = box.value.trim() === "" || !isUsual(key, value);
+  box.setCustomValidity(bad ? `A number from ${LEAST} to ${LARGEST}${key === "fish_mass" ? ", or 0 for no fish" : ""}.` : "");
   if (bad) {
     box.reportValidity();
     return;
@@ -108,6 +111,8 @@ function show(scene, k) {
 function takeText() {
   try {
     const scene = sceneOf($("toml").value, known), text = $("toml").value;
+    const odd = [...CABLE_KEYS, "speed", "gravity"].find((key) => !isUsual(key, scene[key]));
+    if (odd) throw new Error(`${odd.replace(/_/g, " ")} of ${scene[odd]} in SI: this page draws from ${LEAST} to ${LARGEST}`);
     show(scene, -1);
     $("toml").value = text;
     $("wrong").textContent = "";

@@ -158,7 +158,7 @@ const SIGNED = new Set(["submerged_weight_per_length", "submerged_weight"]);
 
 /** All keys of a scene in SI, by section.key; `known.keys` are those of towatlas.scene.keys. */
 function valuesOf(table, known) {
-  const values = {}, flat = {};
+  const values = {}, flat = Object.create(null);
   for (const [name, value] of Object.entries(table)) {
     if (value !== null && typeof value === "object") {
       if (!name || !Object.hasOwn(known.keys, name)) throw new Error(`section [${name}] is unknown; known are cable, fish, tow, fluid`);

@@ -3,6 +3,7 @@
 from base64 import b64encode
 from dataclasses import asdict
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,7 @@ def table_of(scene: Scene, model: str | None = None) -> dict[str, Any]:
     found = scene_diagram(scene, speed=ends, model=model)
     shapes = _Shapes(scene, found.model)
     return {
+        "name": Path(scene.source).stem,
         "scene": {
             name: getattr(scene, name)
             for name in ("title", "length", "mass_per_length", "fish_mass", "radius", "speed", "gravity", "density")
