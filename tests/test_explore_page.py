@@ -126,18 +126,26 @@ def test_with_drag_it_says_what_the_diagram_says(page):
     assert page.run("withDrag()")
 
 
-def test_interpolated_drag_is_the_package_at_a_speed_of_no_sample(page):
-    speed = 1.2345
+@pytest.mark.parametrize("speed", [0.4321, 1.2345, 1.4187, 2.4])
+def test_drag_at_a_speed_of_no_sample_is_that_of_the_package(page, speed):
     put(page, "m_s", speed)
     scene = read_scene("skop-fig3").at(speed=speed)
-    ours = towatlas.answer_scene(scene, model="air", asked=("position",)).equilibria
-    shapes = page.run("shapesNow().map(({ r_f, tension }) => ({ r_f, tension }))")
+    answer = towatlas.answer_scene(scene, model="air", asked=("position",))
+    ours = answer.equilibria
+    shapes = page.run("shapesNow().map((shape) => ({ ...shape, points: shape.curve() }))")
     order = np.argsort(ours.r_f)
-    # Straight lines between samples 1 % apart.
-    found = [shape["r_f"] for shape in shapes]
-    np.testing.assert_allclose(found, ours.r_f[order] * scene.radius, rtol=2e-3)
-    found = [shape["tension"] for shape in shapes]
-    np.testing.assert_allclose(found, ours.tension[order] * scene.force_unit("air"), rtol=2e-3)
+    assert [shape["nodes"] for shape in shapes] == list(ours.nodes[order])
+    # Straight lines between samples 1 % apart, worst at a peak of r_f.
+    np.testing.assert_allclose([shape["r_f"] for shape in shapes], ours.r_f[order] * scene.radius, rtol=1e-2)
+    tensions = ours.tension[order] * scene.force_unit("air")
+    np.testing.assert_allclose([shape["tension"] for shape in shapes], tensions, rtol=2e-3)
+    for shape, row in zip(shapes, order, strict=True):
+        points = np.array(shape["points"])
+        curve = answer.shape(int(row), np.linspace(0.0, scene.length, len(points)))
+        wide = np.abs([curve.x, curve.y]).max()
+        assert np.abs(points[:, 0] - curve.x.values).max() < 0.01 * wide
+        assert np.abs(points[:, 1] - curve.y.values).max() < 0.01 * wide
+        assert np.abs(points[:, 2] - curve.z.values).max() < 0.01 * scene.length
 
 
 def test_every_scene_and_every_shape_can_be_shown(page):

@@ -2,6 +2,7 @@
 
 from base64 import b64encode
 from dataclasses import asdict
+from itertools import pairwise
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -23,10 +24,13 @@ Array = NDArray[np.float64]
 
 # Speeds of the table, as shares of that of the scene.
 RANGE = (0.25, 2.0)
-# Points along a shape, and shapes along a branch before those are left out that their neighbours tell.
-POINTS, SHAPES = 49, 64
-# Within which share of the width and the length of all shapes of a branch they have to tell it: the width of a line.
-TOLD = 4e-3
+# Points along a shape; samples of a branch to a shape, before there are more where they change fast, to this share of
+# the speed, and fewer where they do not.
+POINTS, COARSE, CLOSEST = 49, 8, 1e-3
+# Within which share of its width, length and largest tension a shape is told by those beside it: the width of a line.
+TOLD = 5e-3
+# A shape is one of a branch if log r_f is as near as this, and that of any other so many times as far.
+LIKE, CLEAR = 0.1, 5.0
 # Whole numbers of two bytes, to the largest.
 STEPS = 32767
 # Digits of samples: a thousandth of a picture.
@@ -113,7 +117,7 @@ def _plain(value: Any) -> Any:
 
 
 class _Shapes:
-    """Shapes of one scene by one model, at its speeds."""
+    """Shapes of one scene by one model, at its speeds: x, y, z [m] and tension [N], shape (4, points)."""
 
     def __init__(self, scene: Scene, model: str) -> None:
         self.scene = scene
@@ -123,45 +127,58 @@ class _Shapes:
 
     def along(self, branch: Branch) -> dict[str, Any]:
         """Shapes at some of the speeds of a branch, such that those between them are told by the two next to them."""
-        rows = np.unique(np.linspace(0, len(branch.value) - 1, SHAPES).round().astype(int))
-        speeds, columns = [], []
-        for k in rows:
-            curve = self._at(float(branch.value[k]), float(branch.r_f[k]))
-            if curve is not None:
-                speeds.append(float(branch.value[k]))
-                columns.append(curve)
-        curves = np.array(columns)
-        width, largest = float(np.abs(curves[:, :2]).max()), curves[:, 3].max(axis=1)
-        curves[:, :2] /= width
-        curves[:, 2] /= self.scene.length
-        curves[:, 3] /= largest[:, None]
-        kept = told(np.array(speeds), curves, TOLD)
-        whole = np.round(curves[kept] * STEPS).astype("<i2")
+        coarse = branch.value[np.unique(np.r_[0 : len(branch.value) : COARSE, len(branch.value) - 1])].tolist()
+        found = {speed: curve for speed in coarse if (curve := self._at(branch, speed)) is not None}
+        for low, high in pairwise(sorted(found)):
+            self._refine(branch, low, high, found)
+        speeds = np.array(sorted(found))
+        curves = np.array([found[speed] for speed in speeds.tolist()])
+        kept = told(speeds, curves, TOLD * self._sizes(curves))
+        width, largest = float(np.abs(curves[kept, :2]).max()), curves[kept, 3].max(axis=1)
+        units = np.stack(np.broadcast_arrays(width, width, self.scene.length, largest), axis=1)
+        whole = np.round(curves[kept] / units[:, :, None] * STEPS).astype("<i2")
         return {
-            "value": [speeds[k] for k in kept],
+            "value": speeds[kept].tolist(),
             "width": width,
-            "largest": _plain(largest[kept]),
+            "largest": _plain(largest),
             "points": POINTS,
             "packed": b64encode(whole.tobytes()).decode("ascii"),
         }
 
-    def _at(self, speed: float, r_f: float) -> Array | None:
-        """x, y, z [m] and tension [N] of the shape whose fish is there; None where another is nearer, as at a fold."""
-        check_patience("drawing shapes", "a narrower range takes less")
+    def _refine(self, branch: Branch, low: float, high: float, found: dict[float, Array]) -> None:
+        """More shapes between two speeds, until the middle one is told by those beside it."""
+        middle = 0.5 * (low + high)
+        if high - low < CLOSEST * high or (curve := self._at(branch, middle)) is None:
+            return
+        found[middle] = curve
+        off = np.abs(0.5 * (found[low] + found[high]) - curve)
+        if (off > TOLD * self._sizes(curve[None])[0]).any():
+            self._refine(branch, low, middle, found)
+            self._refine(branch, middle, high, found)
+
+    def _sizes(self, curves: Array) -> Array:
+        """What is small beside each of the curves, shape (curves, 4, 1): width, length, largest tension."""
+        width, largest = np.abs(curves[:, :2]).max(axis=(1, 2)), curves[:, 3].max(axis=1)
+        sizes = np.broadcast_arrays(width, width, self.scene.length, largest)
+        return np.stack(sizes, axis=1)[:, :, None]
+
+    def _at(self, branch: Branch, speed: float) -> Array | None:
+        """The shape of a branch; None where two are as near, as next to a fold."""
+        check_patience("drawing shapes", "a scene at a lower speed takes less")
         if speed not in self.known:
             self.known[speed] = solve_equilibria(self.system, abs(self.scene.at(speed=speed).gamma))
-        found = self.known[speed]
-        far = np.abs(np.log(found.r_f * self.scene.radius / r_f))
-        if not len(far) or far.min() > 1e-3:
+        found, radius = self.known[speed], self.scene.radius
+        far = np.abs(np.log(found.r_f * radius / np.interp(speed, branch.value, branch.r_f)))
+        order = np.argsort(far)
+        if not len(order) or far[order[0]] > LIKE or (len(order) > 1 and far[order[1]] < CLEAR * far[order[0]]):
             return None
-        curve = shape_of(found, int(far.argmin()), np.linspace(0.0, self.system.lam, POINTS))
+        curve = shape_of(found, int(order[0]), np.linspace(0.0, self.system.lam, POINTS))
         # The mirror image of a turn to port is turned back.
         y = curve.y.values * (-1.0 if self.scene.turn == "port" else 1.0)
-        radius = self.scene.radius
         return np.array([curve.x * radius, y * radius, curve.z * radius, curve["T"] * self.force])
 
 
-def told(value: Array, curves: Array, within: float) -> list[int]:
+def told(value: Array, curves: Array, within: Array) -> list[int]:
     """Which curves tell the others by straight lines between neighbours.
 
     Parameters
@@ -169,22 +186,24 @@ def told(value: Array, curves: Array, within: float) -> list[int]:
     value : ndarray, shape (curves,)
         Rising.
     curves : ndarray, shape (curves, ...)
-    within : float
-        By how much a coordinate of what is left out may be off, > 0.
+    within : ndarray
+        By how much numbers of what is left out may be off, > 0; of a shape that broadcasts with that of the curves.
 
     Returns
     -------
     list of int
         The first and the last among them.
     """
+    within = np.broadcast_to(within, curves.shape)
     kept, first = [0], 0
     while first < len(value) - 1:
         last = len(value) - 1
         while last > first + 1:
-            share = (value[first + 1 : last] - value[first]) / (value[last] - value[first])
+            inside = slice(first + 1, last)
+            share = (value[inside] - value[first]) / (value[last] - value[first])
             share = share.reshape(-1, *[1] * (curves.ndim - 1))
             line = curves[first] + share * (curves[last] - curves[first])
-            if np.abs(line - curves[first + 1 : last]).max() <= within:
+            if (np.abs(line - curves[inside]) <= within[inside]).all():
                 break
             last -= 1
         kept.append(last)
