@@ -145,7 +145,7 @@ function drawCable(view, { points, tension, kind, main }) {
   view.add("circle", { class: "dot", cx: across, cy: down, r: main ? 6 : 3.5, opacity: main ? 1 : 0.6 });
 }
 
-/** Rings where the main cable crosses the axis, and the word beside them. */
+/** Rings where the main cable crosses the axis, and the word beside the first, on the side of the axis where "fish" is not. */
 function drawNodes(view, points) {
   let first = true;
   for (let k = 0; k + 1 < points.length; k++) {
@@ -153,7 +153,8 @@ function drawNodes(view, points) {
     if (x * next >= 0) continue;
     const down = view.y(z + (lower - z) * x / (x - next));
     view.add("circle", { class: "fold", cx: view.x(0), cy: down, r: 4.5 });
-    if (first) view.add("text", { class: "halo", x: view.x(0) + 10, y: down - 5 }, "node");
+    const near = Math.abs(down - view.y(points[points.length - 1][1])) < 30;
+    if (first) view.add("text", { class: "halo", x: view.x(0) + (near ? -10 : 10), y: down - 5, "text-anchor": near ? "end" : "start" }, "node");
     first = false;
   }
 }

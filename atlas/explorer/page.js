@@ -32,12 +32,13 @@ function makeControls() {
   }
   $("speed-slide").addEventListener("input", (event) => change({ speed: fromSlide("speed", Number(event.target.value)) }));
   for (const [id, unit] of [["kn", "kn"], ["rpm", "rpm"], ["m_s", "m/s"]]) {
-    $(id).addEventListener("change", () => {
-      state.unit = unit;
-      typed($(id), "speed", perUnit(unit));
-    });
-    $(id).addEventListener("focus", () => { state.unit = unit; draw(); });
+    $(id).addEventListener("change", () => typed($(id), "speed", perUnit(unit)));
+    $("unit").append(element("option", { value: unit }, unit));
   }
+  $("unit").addEventListener("change", () => {
+    state.unit = $("unit").value;
+    draw();
+  });
   $("scene").addEventListener("change", () => {
     const k = Number($("scene").value);
     if (k >= 0) show(known.tables[k].scene, k);

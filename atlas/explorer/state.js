@@ -4,7 +4,7 @@
 const known = JSON.parse(document.getElementById("known").textContent);
 const KNOT = 1852 / 3600;
 // Work above which shapes are not looked for in a page (workOf): some seconds; and for whole curves: less for each.
-const MOST_WORK = 4000, CURVE_WORK = 4000;
+const MOST_WORK = 2000, CURVE_WORK = 1000;
 const MOST_STATES = 40;
 const state = { scene: 0, model: "drag", picked: null, unit: "kn", length: 1, mass_per_length: 1, fish_mass: 0, radius: 1, speed: 1, gravity: GRAVITY, title: "", density: 0 };
 // What sliders move about.
