@@ -155,7 +155,7 @@ function drawControls() {
   const fill = (box, value) => { if (document.activeElement !== box || box.validity.valid) box.value = value; };
   $("scene").value = state.scene;
   for (const [key, label, unit] of SLIDERS) {
-    fill($(key), Number(state[key].toPrecision(6)));
+    fill($(key), Number(state[key].toPrecision(5)));
     $(`${key}-slide`).value = toSlide(key);
     $(`${key}-slide`).setAttribute("aria-valuetext", `${label} ${digits(state[key])} ${unit}`);
   }
