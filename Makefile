@@ -63,6 +63,7 @@ figures: install  ## draw the figures of the README from build/atlas.nc, and the
 	$(BIN)/python -m towatlas report device --out build/device.html
 	$(BIN)/python -m towatlas plot device --out docs/device.svg
 	$(BIN)/python -m towatlas diagram --lam 10 --wf 1 --C 0.03 --gamma 0.2:2 --patience 300 --out docs/diagram.svg
+	$(BIN)/python -m towatlas explore --patience 600 --out docs/explore.html
 
 clean:  ## remove .venv, build and caches
 	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache

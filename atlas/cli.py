@@ -34,6 +34,7 @@ COMMANDS = (
     "device",
     "build",
     "plot",
+    "explore",
     "report",
     "info",
     "warmup",

@@ -106,12 +106,13 @@ def test_every_package_is_listed():
 
 @pytest.mark.network
 def test_the_wheel_holds_what_the_repository_does(wheel):
-    """Every module, the scenes, the types of cable, and the tables of sources."""
+    """Every module, the scenes, the types of cable, the tables of sources, and the parts of the page."""
+    kinds = ("*.py", "*.toml", "*.csv", "*.npz", "scenes/*.toml", "*.html", "*.css", "*.js")
     inside = set(zipfile.ZipFile(wheel).namelist())
     expected = set()
     for package in SETUPTOOLS["packages"]:
         folder = ROOT / folder_of(package)
-        files = [path for kind in ("*.py", "*.toml", "*.csv", "*.npz", "scenes/*.toml") for path in folder.glob(kind)]
+        files = [path for kind in kinds for path in folder.glob(kind)]
         expected |= {"/".join([*package.split("."), *path.relative_to(folder).parts]) for path in files}
     assert {".toml", ".csv"} < {Path(name).suffix for name in expected}
     assert expected == {name for name in inside if ".dist-info/" not in name}

@@ -63,6 +63,7 @@ def test_one_shot_is_enough_in_all_the_domain():
     offset = np.abs(cold["x_f"]) * cold["gamma"] ** 2
     miss = np.abs([gamma / cold["gamma"] - 1, a / offset - 1]).max(axis=0)
     assert miss[seeded].max() < 2e-8
+    gamma_slopes = opened(_gamma_slopes)
     # Slopes of gamma from the Wronskian of a shot, exact, against derivatives of the series.
     for order in (1, 3, 6):
         rows = np.flatnonzero(n == order)[:500]

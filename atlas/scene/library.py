@@ -223,6 +223,21 @@ def find_type(name: str, library: str | None = None, folder: Path = Path()) -> C
         raise ValueError(f"{where}: {error}") from None
 
 
+def shipped_types() -> list[str]:
+    """Names of the types of cable that come with the package.
+
+    Returns
+    -------
+    list of str
+
+    Examples
+    --------
+    >>> shipped_types()[:2]
+    ['pode-A', 'pode-B']
+    """
+    return list(_shipped())
+
+
 @cache
 def _shipped() -> dict[str, Any]:
     file = resources.files("towatlas.scene") / "cables.toml"

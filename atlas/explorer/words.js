@@ -1,0 +1,120 @@
+"use strict";
+// What the page says: the shape at the speed, what comes as the speed rises and falls.
+
+const KINDS = {
+  stable: "lasts", weak: "lasts, while a slow swing grows a little", flutter: "flutters: swings grow", divergence: "left at once: unstable",
+  rotation: "held by its rotation; may flutter", unknown: "not known",
+};
+const KIND_LINES = {
+  stable: "lasts", weak: "lasts, a slow swing grows a little", flutter: "flutters", divergence: "unstable: left at once",
+  rotation: "held by rotation, may flutter",
+};
+
+const WORDS = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"];
+const counted = (count, what) => `${WORDS[count] ?? count} ${what}${count === 1 ? "" : "s"}`;
+const nodesText = (count) => counted(count, "node");
+const doublingText = (growth) => (growth > 0 ? `, doubling in ${digits(Math.LN2 / growth, 2)} s` : "");
+
+function shapeTitle(shape) {
+  const nodes = shape.nodes ? nodesText(shape.nodes) : "no node, swung out";
+  return shape.name.endsWith("outer") ? `${nodes}, outer of its pair` : shape.name.endsWith("inner") ? `${nodes}, inner` : nodes;
+}
+
+/** What the cable does now: a sentence. */
+function nowText(shapes) {
+  const speed = `${digits(speedIn(state.speed, "kn"))} kn (${digits(speedIn(state.speed, "rpm"))} rpm)`;
+  if (!shapes) return `At ${speed} this cable has too many shapes to be looked for in a page: towatlas lists them.`;
+  if (!shapes.length) return `At ${speed} no shape is tabulated.`;
+  const one = shapes.find((shape) => shape.expected) ?? shapes[0];
+  const many = shapes.length === 1 ? "the cable has one shape" : `the cable can take ${counted(shapes.length, "shape")}`;
+  const lead = shapes.length === 1 ? "It has" : "The one to expect has";
+  const where = `its fish ${lengthText(one.r_f)} from the axis and ${lengthText(one.z_f)} below the tow point`;
+  return `At ${speed} ${many}. ${lead} ${nodesText(one.nodes)}, ${where}, and ${fateText(one)}.`;
+}
+
+function fateText(shape) {
+  if (shape.kind === "flutter") {
+    return `flutters: swings grow${doublingText(shape.growth)}${swingsText(shape)}`;
+  }
+  return {
+    stable: "lasts", weak: "lasts", divergence: "is left at once", rotation: "is held by nothing but its rotation: it may flutter",
+    unknown: "may last or not: not known",
+  }[shape.kind];
+}
+
+const swingsText = ({ frequency }) => (frequency > 0 ? `, ${digits(frequency, 2)} swings a second` : "");
+
+/** What comes next as the speed rises, and falls: a sentence. `states` are critical states without drag. */
+function thenText(states) {
+  if (withDrag()) {
+    const table = tableHere(), up = nextSeen(table.rising, state.speed, true), down = nextSeen(table.falling, state.speed, false);
+    return `Faster: ${up}. Slower: ${down}.`;
+  }
+  const { gamma, unit, lam, wf } = groups(), count = transitions(lam, wf);
+  if (!count) return "The cable is too short for a jump: at every speed it has one shape.";
+  const passed = states.filter((one) => one.gamma <= gamma).length, next = states[passed], last = states[passed - 1];
+  const percent = (one) => `${digits(100 * Math.abs(one.gamma / gamma - 1), 2)} %`;
+  const up = next ? `at ${speedText(next.gamma * unit)} (${percent(next)} more) two shapes with ${nodesText(next.n)} appear, and the cable may jump to one`
+    : "no further shapes appear that this page lists";
+  const down = last ? `at ${speedText(last.gamma * unit)} (${percent(last)} less) this shape ends, and the cable must jump` : "the cable keeps its one shape";
+  return `Faster: ${up}. Slower: ${down}.`;
+}
+
+function nextSeen(parts, speed, rises) {
+  const items = groupsOf(parts), k = items.findIndex((item) => item.what === "stretch" && item.low <= speed && speed <= item.high);
+  if (k < 0) return "this speed is not met on the way";
+  const next = items[k + 1], end = rises ? items[k].high : items[k].low;
+  if (!next) return `the same to ${speedText(end)}, where the table ends`;
+  return next.what === "jump" ? `at ${speedText(next.value)} ${seenText(next)}` : `from ${speedText(end)} on it ${seenText(next)}`;
+}
+
+/** Stretches of one branch that last, told together. */
+function groupsOf(parts) {
+  const found = [];
+  for (const part of parts) {
+    const last = found[found.length - 1], lasting = (one) => one.kind === "stable" || one.kind === "weak";
+    if (last && part.what === "stretch" && last.what === "stretch" && last.branch === part.branch && lasting(last) && lasting(part)) {
+      last.low = Math.min(last.low, part.low);
+      last.high = Math.max(last.high, part.high);
+      last.nodes = [Math.min(last.nodes[0], part.nodes[0]), Math.max(last.nodes[1], part.nodes[1])];
+      last.weak = last.weak || part.kind === "weak";
+    } else found.push({ ...part, weak: part.kind === "weak" });
+  }
+  return found;
+}
+
+function seenText(part) {
+  if (part.what === "jump") return part.end < 0 ? "it jumps, and no shape lasts" : "it jumps";
+  const nodes = part.nodes[0] === part.nodes[1] ? nodesText(part.nodes[0]) : `${nodesText(part.nodes[0])} to ${nodesText(part.nodes[1])}`;
+  if (part.kind === "flutter") {
+    return `flutters about ${nodes}${doublingText(part.growth)}${swingsText(part)}`;
+  }
+  if (part.kind === "unknown") return `has ${nodes}; whether it lasts is not known`;
+  return `lasts with ${nodes}${part.weak ? ", a slow swing growing a little" : ""}`;
+}
+
+/** What happens as the speed rises, as items {low, high, text, kind}, in m/s. */
+function risingItems(states, low, high) {
+  if (withDrag()) {
+    return groupsOf(tableHere().rising).map((part) => (part.what === "jump"
+      ? { low: part.value, high: part.value, text: seenText(part), kind: "jump" }
+      : { low: part.low, high: part.high, text: seenText(part), kind: part.kind }));
+  }
+  const { unit } = groups(), edges = states.map((one) => one.gamma * unit).filter((speed) => speed < high);
+  return [0, ...edges].map((from, n) => ({
+    low: from, high: edges[n] ?? high,
+    text: n ? `${counted(2 * n + 1, "shape")}; a jump to one with ${nodesText(n)} is possible` : "one shape, without a node",
+    kind: n ? "rotation" : "stable",
+  }));
+}
+
+/** The scene on show as a file that towatlas reads. */
+function tomlOf() {
+  const lines = state.title ? [`title = ${JSON.stringify(state.title)}`] : [];
+  if (state.gravity !== GRAVITY) lines.push(`gravity = ${state.gravity}`);
+  if (state.density) lines.push("# without its drag and buoyancy: a file with them gives a page with a table, by towatlas explore");
+  lines.push("", "[cable]", `length = "${state.length} m"`, `mass_per_length = "${state.mass_per_length} kg/m"`);
+  if (state.fish_mass) lines.push("", "[fish]", `mass = "${state.fish_mass} kg"`);
+  lines.push("", "[tow]", `radius = "${state.radius} m"`, `speed = "${state.speed} m/s"`, "", "[fluid]", 'name = "vacuum"', "");
+  return lines.join("\n").trimStart();
+}

@@ -1,0 +1,300 @@
+"""The page that explores scenes, driven in a browser from file://, with keyboard and pointer."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import Page, find_browser
+
+import towatlas
+from towatlas.scene.file import read_scene
+from towatlas.solve.critical import solve_critical
+
+pytestmark = pytest.mark.skipif(find_browser() is None, reason="no Chromium or Chrome is installed")
+
+# By `make figures`.
+SHIPPED = Path(__file__).parents[1] / "docs" / "explore.html"
+SLIDERS = ("speed", "length", "mass_per_length", "fish_mass", "radius")
+ARROW_RIGHT, HOME, SPACE, TAB = ("ArrowRight", 39), ("Home", 36), (" ", 32), ("Tab", 9)
+# What a person would wait.
+SETTLED = (
+    "new Promise((done) => { const look = () => jobs.size ? setTimeout(look, 20) : setTimeout(done, 20); look(); })"
+)
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    page = Page(tmp_path_factory.mktemp("browser"))
+    yield page
+    page.close()
+
+
+@pytest.fixture
+def page(browser):
+    browser.resize(1280, 900)
+    browser.open(SHIPPED)
+    browser.errors.clear()
+    browser.requests.clear()
+    browser.open(SHIPPED)
+    yield browser
+    assert browser.errors == []
+    # The page itself, and nothing after it.
+    assert [url.partition(":")[0] for url in browser.requests] == ["file"]
+
+
+def say(page):
+    return page.run("document.getElementById('now').textContent")
+
+
+def seen(page):
+    """What is written about the shapes, and how they are drawn."""
+    return page.run("$('now').textContent + $('rows').textContent + $('side').innerHTML + $('close').innerHTML")
+
+
+def put(page, name, value):
+    """A number typed into a box."""
+    page.run(
+        f"(() => {{ const box = document.getElementById('{name}'); box.focus(); box.value = '{value}';"
+        " box.dispatchEvent(new Event('change')); box.blur(); })()"
+    )
+
+
+def paste(page, text):
+    page.run(f"document.getElementById('toml').value = {json.dumps(text)}; document.getElementById('take').click()")
+    return page.run("document.getElementById('wrong').textContent")
+
+
+def test_every_slider_moves_with_the_keys_and_what_is_said_with_it(page):
+    for name in SLIDERS:
+        before = seen(page), page.run(f"state.{name}")
+        page.run(f"document.getElementById('{name}-slide').focus()")
+        for _ in range(12):
+            page.key(*ARROW_RIGHT)
+        assert page.run(f"state.{name}") > before[1]
+        assert seen(page) != before[0], name
+        page.key(*HOME)
+        assert page.run(f"state.{name}") < before[1]
+        assert page.run(f"document.getElementById('{name}-slide').getAttribute('aria-valuetext')")
+        page.run(SETTLED)
+    assert page.run("state.fish_mass") == 0
+    assert not page.run("withDrag()")
+
+
+def test_numbers_on_show_are_those_of_the_package(page):
+    page.run("document.getElementById('no-drag').click()")
+    for length, speed in ((0.6604, 1.229), (0.9, 2.0), (0.3, 0.7)):
+        put(page, "length", length)
+        put(page, "m_s", speed)
+        scene = read_scene("skop-fig3", {"cable.length": length, "tow.speed": speed})
+        groups = scene.system("vacuum")
+        ours = towatlas.equilibria(groups.lam, groups.w_f, scene.gamma)
+        shapes = page.run("shapesNow().map(({ name, r_f, z_f, tension }) => ({ name, r_f, z_f, tension }))")
+        order = np.argsort(ours.r_f)
+        assert [shape["name"] for shape in shapes] == list(ours.branch[order])
+        force = scene.force_unit("vacuum")
+        for name, values in (("r_f", ours.r_f * scene.radius), ("tension", ours.tension * force)):
+            np.testing.assert_allclose([shape[name] for shape in shapes], values[order], rtol=1e-9)
+        n = page.run("critical.map((one) => one.n)")
+        speeds = scene.speed_of(solve_critical(groups.lam, groups.w_f, n).gamma)
+        np.testing.assert_allclose(page.run("critical.map((one) => one.gamma * groups().unit)"), speeds, rtol=1e-9)
+        # As it is written.
+        rows = page.run("[...document.querySelectorAll('#critical-rows tr')].map((row) => row.cells[3].textContent)")
+        np.testing.assert_allclose([float(row) for row in rows], speeds, rtol=1e-4)
+        words = page.run("document.querySelectorAll('#rows tr').length")
+        assert words == len(ours)
+
+
+def test_with_drag_it_says_what_the_diagram_says(page):
+    table = page.run("(({ rising, low, high }) => ({ rising, low, high }))(known.tables[0])")
+    assert page.run("withDrag()")
+    for part in table["rising"]:
+        put(page, "m_s", 0.5 * (part["low"] + part["high"]))
+        now = page.run("(({ kind, nodes }) => ({ kind, nodes }))(shapesNow().find((one) => one.expected))")
+        assert part["nodes"][0] <= now["nodes"] <= part["nodes"][1]
+        assert ("flutter" in say(page)) == (part["kind"] == "flutter")
+        assert page.run("document.querySelectorAll('#rising [aria-current]').length") == 1
+    put(page, "m_s", 2 * table["high"])
+    assert "no shape is tabulated" in say(page)
+    put(page, "m_s", 1.0)
+    # Another cable has no table; back to the scene there is one.
+    put(page, "radius", 0.02)
+    assert not page.run("withDrag()")
+    assert page.run("document.getElementById('with-drag').disabled")
+    assert page.run("document.getElementById('radius').value") == "0.02"
+    page.run("document.getElementById('back').click()")
+    assert page.run("withDrag()")
+
+
+@pytest.mark.parametrize("speed", [0.4321, 1.2345, 1.4187, 2.4])
+def test_drag_at_a_speed_of_no_sample_is_that_of_the_package(page, speed):
+    put(page, "m_s", speed)
+    scene = read_scene("skop-fig3").at(speed=speed)
+    answer = towatlas.answer_scene(scene, model="air", asked=("position",))
+    ours = answer.equilibria
+    shapes = page.run("shapesNow().map((shape) => ({ ...shape, points: shape.curve() }))")
+    order = np.argsort(ours.r_f)
+    assert [shape["nodes"] for shape in shapes] == list(ours.nodes[order])
+    # Straight lines between samples 1 % apart, worst at a peak of r_f.
+    np.testing.assert_allclose([shape["r_f"] for shape in shapes], ours.r_f[order] * scene.radius, rtol=1e-2)
+    tensions = ours.tension[order] * scene.force_unit("air")
+    np.testing.assert_allclose([shape["tension"] for shape in shapes], tensions, rtol=2e-3)
+    for shape, row in zip(shapes, order, strict=True):
+        points = np.array(shape["points"])
+        curve = answer.shape(int(row), np.linspace(0.0, scene.length, len(points)))
+        wide = np.abs([curve.x, curve.y]).max()
+        assert np.abs(points[:, 0] - curve.x.values).max() < 0.01 * wide
+        assert np.abs(points[:, 1] - curve.y.values).max() < 0.01 * wide
+        assert np.abs(points[:, 2] - curve.z.values).max() < 0.01 * scene.length
+
+
+def test_every_scene_and_every_shape_can_be_shown(page):
+    for k in range(page.run("known.tables.length")):
+        page.run(f"$('scene').value = {k}; $('scene').dispatchEvent(new Event('change'))")
+        assert "shape" in say(page)
+        for row in range(page.run("document.querySelectorAll('#rows input').length")):
+            before = page.run("document.getElementById('side').getAttribute('aria-label')")
+            page.run(f"document.querySelectorAll('#rows input')[{row}].click()")
+            after = page.run("document.getElementById('side').getAttribute('aria-label')")
+            assert row == 0 or after != before
+            assert page.run(f"document.querySelectorAll('#rows input')[{row}].checked")
+
+
+HUGE = "[cable]\nlength = 1e200\nmass_per_length = 1\n[tow]\nradius = 1\nspeed = 1\n[fluid]\nname = 'vacuum'\n"
+BAD = (
+    "",
+    "no TOML",
+    "[cable]\nlength = 3",
+    '[cable]\nlength = "3 kg"',
+    "<img src=x onerror=alert(1)>",
+    "[cable",
+    "a = " + "9" * 400,
+    HUGE,
+)
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_bad_scene_is_refused_in_words_and_nothing_changes(page, text):
+    before = page.run("JSON.stringify(state)")
+    assert paste(page, text)
+    assert page.run("JSON.stringify(state)") == before
+    assert page.run("document.querySelectorAll('img').length") == 0
+
+
+def test_the_scene_on_show_can_be_pasted_back_and_another(page):
+    before = page.run("JSON.stringify(CABLE_KEYS.map((key) => state[key]))")
+    assert paste(page, page.run("document.getElementById('toml').value")) == ""
+    assert page.run("JSON.stringify(CABLE_KEYS.map((key) => state[key]))") == before
+    text = '[cable]\nlength = "1000 ft"\nmass_per_length = "0.3 lb/ft"\n[fish]\nmass = "200 lb"\n'
+    text += '[tow]\nradius = "100 yd"\nspeed = "25 kn"\n[fluid]\nname = "vacuum"\n'
+    assert paste(page, text) == ""
+    page.run(SETTLED)
+    assert page.run("state.length") == pytest.approx(304.8)
+    assert page.run("document.getElementById('kn').value") == "25"
+    assert "At 25 kn" in say(page)
+    assert page.run("document.getElementById('toml').value") == text
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("length", "-1"), ("speed", "0"), ("radius", ""), ("fish_mass", "-3"), ("kn", "0"), ("m_s", "1e308")],
+)
+def test_bad_numbers_are_refused(page, name, value):
+    before = page.run("JSON.stringify(state)")
+    put(page, "m_s" if name == "speed" else name, value)
+    assert page.run("JSON.stringify(state)") == before
+
+
+@pytest.mark.parametrize(
+    ("length", "speed"), [(1e-6, 1.0), (1e6, 1.0), (0.66, 1e-6), (0.66, 1e6), (1e9, 1e9), (0.0175, 3.0)]
+)
+def test_extreme_cables_are_answered_or_refused_in_seconds(page, length, speed):
+    page.run("document.getElementById('no-drag').click()")
+    put(page, "length", length)
+    put(page, "m_s", speed)
+    page.run(SETTLED)
+    assert "shape" in say(page)
+    assert "NaN" not in page.run("document.querySelector('main').innerHTML")
+
+
+def test_charts_are_drawn_in_the_unit_chosen(page):
+    for unit in ("rpm", "m/s", "kn"):
+        page.run(f"$('unit').value = '{unit}'; $('unit').dispatchEvent(new Event('change'))")
+        assert f"speed of the tow point, {unit}" in page.run("$('diagram').textContent")
+        assert f" {unit}: " in page.run("$('rising').textContent")
+
+
+def test_a_click_on_a_chart_goes_there(page):
+    for chart, name in (("diagram", "speed"), ("critical", "length"), ("tension", "speed")):
+        before = page.run(f"state.{name}")
+        box = page.run(
+            f"(() => {{ const svg = document.getElementById('{chart}'); svg.scrollIntoView({{ block: 'center' }});"
+            " const { x, y, width, height } = svg.getBoundingClientRect(); return [x, y, width, height]; })()"
+        )
+        page.click(box[0] + 0.8 * box[2], box[1] + 0.5 * box[3])
+        assert page.run(f"state.{name}") > 1.2 * before
+        page.run("document.getElementById('scene').value = 0; show(known.tables[0].scene, 0)")
+
+
+def test_the_keyboard_reaches_every_control_and_each_has_a_name(page):
+    page.run("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+    wanted = page.run(
+        "[...document.querySelectorAll('input, select, textarea, button, summary')]"
+        ".filter((one) => one.getClientRects().length && one.type !== 'radio').length"
+    )
+    reached = set()
+    page.run("document.activeElement.blur()")
+    for _ in range(wanted + 12):
+        page.key(*TAB)
+        reached.add(page.run("document.activeElement.id || document.activeElement.parentNode.id"))
+    assert {"scene", "speed-slide", "kn", "rpm", "m_s", "length", "radius-slide", "toml", "take"} <= reached
+    roles = {"slider", "spinbutton", "combobox", "radio", "textbox", "button", "image", "img"}
+    named = [
+        (node["role"]["value"], node.get("name", {}).get("value", ""))
+        for node in page.accessible()
+        if not node.get("ignored") and node["role"]["value"] in roles
+    ]
+    assert {"slider", "spinbutton", "radio", "textbox"} <= {role for role, _ in named}
+    assert [role for role, name in named if not name.strip()] == []
+
+
+def test_a_screen_reader_is_told_once_a_slider_rests(page):
+    page.run("change({ speed: 1.5 })")
+    page.run("new Promise((done) => setTimeout(done, 900))")
+    spoken = page.run("document.getElementById('spoken').textContent")
+    assert spoken.startswith(say(page))
+    assert page.run("document.getElementById('spoken').getAttribute('aria-live')") == "polite"
+
+
+@pytest.mark.parametrize("width", [320, 390, 768, 1280])
+def test_nothing_overflows_sideways(page, width):
+    page.resize(width, 844)
+    page.run("draw()")
+    assert page.run("document.documentElement.scrollWidth") <= width
+    # Drawn to the width there is.
+    assert page.run("document.getElementById('diagram').viewBox.baseVal.width") <= width
+
+
+def luminance(color):
+    channels = np.array([int(color[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+    linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_text_and_lines_stand_out_in_light_and_dark(page, dark):
+    page.theme(dark)
+    names = ["ground", "panel", "ink", "soft", "accent", "lasts", "flutter", "left", "held"]
+    style = "getComputedStyle(document.documentElement)"
+    colors = {name: page.run(f"{style}.getPropertyValue('--{name}').trim()") for name in names}
+    page.theme(False)
+    assert (luminance(colors["ground"]) < 0.1) == dark
+
+    def contrast(one, other):
+        low, high = sorted(luminance(colors[name]) for name in (one, other))
+        return (high + 0.05) / (low + 0.05)
+
+    # WCAG 2.2: 4.5 for text, 3 for lines.
+    for ground in ("ground", "panel"):
+        assert min(contrast(name, ground) for name in ("ink", "soft", "left")) > 4.5
+    assert min(contrast(name, "ground") for name in ("lasts", "flutter", "left", "held", "accent")) > 3.0
