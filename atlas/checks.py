@@ -63,6 +63,32 @@ def check_real(name: str, value: Any) -> NDArray[np.float64]:
     return array.astype(np.float64)
 
 
+# Whole numbers beyond are no int64, which `check_real` refuses.
+_LARGEST = 2**63
+
+
+def one_number(value: Any) -> float | None:
+    """A number that needs no check and no conversion: what makes one lookup fast.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    float or None
+        None for all that `check_real` has to look at.
+    """
+    kind = type(value)
+    if kind is float:
+        return value
+    if kind is int:
+        return float(value) if -_LARGEST <= value < _LARGEST else None
+    if (isinstance(value, np.number) or kind is np.ndarray) and value.ndim == 0 and value.dtype.kind in "iuf":
+        return float(value)
+    return None
+
+
 def check_order(value: Any) -> NDArray[np.int64]:
     """Number of a transition: whole numbers from 1.
 

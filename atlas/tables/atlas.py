@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from towatlas.checks import (
@@ -14,6 +15,7 @@ from towatlas.checks import (
     check_order,
     check_outside,
     check_real,
+    one_number,
 )
 from towatlas.nomenclature import SYMBOLS, Symbol
 from towatlas.results import CriticalStates, DragFolds, FishPositions
@@ -184,6 +186,10 @@ class Atlas:
         ['no such transition: the cable is not longer than lambda_cn', 'computed']
         """
         check_outside(outside)
+        if one := self._one(QUANTITIES, lam, w_f, n):
+            whole = {"n": np.int64, "status": np.int8}
+            given = {"n": n, "lam": lam, "w_f": w_f} | one
+            return CriticalStates(**{name: np.array(value, whole.get(name, float)) for name, value in given.items()})
         lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
         table = self.critical.answer(QUANTITIES, outside, lam=lam.ravel(), w_f=w_f.ravel(), n=n.ravel())
         return CriticalStates(n=n, lam=lam, w_f=w_f, **_shaped(table, n))
@@ -415,14 +421,24 @@ class Atlas:
         return DragFolds(n=n, lam=lam, w_f=w_f, C=C, **_shaped(table, n))
 
     def _quantity(self, name: str, lam: Any, w_f: Any, n: Any, outside: str) -> Any:
+        check_outside(outside)
+        if one := self._one((name,), lam, w_f, n):
+            return np.int8(one[name]) if name == "status" else np.float64(one[name])
+
         def plain(*cable: Any) -> Any:
-            check_outside(outside)
             lam, w_f, n = cable
             lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
             table = self.critical.answer((name,), outside, lam=lam.ravel(), w_f=w_f.ravel(), n=n.ravel())
             return table[name].reshape(n.shape)[()]
 
         return _with_xarray(plain, SYMBOLS[name], lam, w_f, n)
+
+    def _one(self, names: tuple[str, ...], lam: Any, w_f: Any, n: Any) -> dict[str, float] | None:
+        """Quantities of one point that needs no check beyond its being in the table; None for all others."""
+        lam, w_f, n = one_number(lam), one_number(w_f), one_number(n)
+        if lam is None or w_f is None or n is None:
+            return None
+        return self.critical.one(names, lam=lam, w_f=w_f, n=n)
 
 
 def _shaped(table: dict[str, NDArray[Any]], like: NDArray[Any]) -> dict[str, NDArray[Any]]:
