@@ -1,7 +1,6 @@
 """The benchmarks, run once with small sizes so that they cannot rot. No test asserts a time."""
 
 import csv
-import json
 
 import numpy as np
 import pytest
@@ -248,13 +247,28 @@ def test_guard_names_what_got_worse(tmp_path, monkeypatch):
     kept = [targets.Target("a", 10.0, 9.0), targets.Target("b", 10.0, None)]
     assert "no committed ratios" in targets.compare(kept, path)[0]
     targets.keep(kept, path)
-    assert json.loads(path.read_text())["ratios"] == {"a": 10.0, "b": 10.0}
+    assert targets.kept(path)[targets.processor()] == kept
     assert "no ratio is worse" in targets.compare([targets.Target("a", 8.6, 9.0), kept[1]], path)[0]
     verdict = targets.compare([targets.Target("a", 8.4, 9.0)], path)
     assert verdict[0].startswith("WORSE: a")
     assert verdict[1] == "not measured: b"
     monkeypatch.setattr(targets, "processor", lambda: "another")
     assert targets.compare(kept, path)[0].startswith("not compared")
+
+
+def test_each_processor_keeps_its_ratios(tmp_path, monkeypatch):
+    """And what one of them does not reach is in the table, with its name."""
+    path = tmp_path / "ratios.json"
+    for name, value in (("first", 10.0), ("second", 8.0), ("second", 8.5)):
+        monkeypatch.setattr(targets, "processor", lambda name=name: name)
+        targets.keep([targets.Target("a", value, 9.0, f"of {name}"), targets.Target(name, 1.0, None)], path)
+    entries = targets.kept(path)
+    assert [entries[name][0].value for name in ("first", "second")] == [10.0, 8.5]
+    table = report.ratios_table(entries).splitlines()
+    assert table[0] == "| ratio | at least | first | second | | |"
+    assert table[2] == "| a | 9 | 10 | 8.5 | not reached: second | of first |"
+    assert table[4] == "| second |  |  | 1 | watched |  |"
+    assert len({line.count("|") for line in table}) == 1
 
 
 def test_targets_say_whether_they_are_reached():
