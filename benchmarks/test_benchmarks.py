@@ -22,6 +22,7 @@ from benchmarks import (
     stability,
     targets,
     targets_drag,
+    waiting,
 )
 from benchmarks.timing import LOST, Row
 from towatlas.limits import threshold_length
@@ -269,6 +270,17 @@ def test_each_processor_keeps_its_ratios(tmp_path, monkeypatch):
     assert table[2] == "| a | 9 | 10 | 8.5 | not reached: second | of first |"
     assert table[4] == "| second |  |  | 1 | watched |  |"
     assert len({line.count("|") for line in table}) == 1
+
+
+def test_waiting(tmp_path):
+    """Of the shortest command; a command that was measured before is one that is measured."""
+    assert set(waiting.before()) == set(waiting.COMMANDS)
+    version = waiting.measure({"critical": "--version"}, repeats=1)
+    assert version[0].cold > 0.0
+    earlier = {"critical": waiting.Wait("critical", 12.0, float("nan"))}
+    assert waiting.table(version, earlier).splitlines()[2].startswith("| critical | 12 s | ")
+    figures.waiting([(version[0], earlier["critical"])], tmp_path / "waiting")
+    assert {path.suffix for path in tmp_path.iterdir()} == {".svg", ".png"}
 
 
 def test_targets_say_whether_they_are_reached():
