@@ -165,6 +165,9 @@ class CriticalTable:
         """
         return method == METHOD
 
+    def __repr__(self) -> str:
+        return f"{self.holds}: {', '.join(f'{name} {held}' for name, held in self.domain().items())}"
+
     def domain(self) -> dict[str, str]:
         """Ranges of what is held, in words.
 
