@@ -181,9 +181,9 @@ def of_lookup(rows: list[Row]) -> list[Target]:
     return found
 
 
-def of_one_lookup(spent: float) -> list[Target]:
-    """One lookup from Python, as 10 us over what it takes."""
-    return [Target("10 us over one lookup, error and status included", 1e-5 / spent, 1.0, f"{spent * 1e6:.1f} us")]
+def of_one_lookup(spent: dict[str, float]) -> list[Target]:
+    """Lookups of one cable from Python, as 10 us over what they take."""
+    return [Target(f"10 us over a lookup of {what}", 1e-5 / s, 1.0, f"{s * 1e6:.1f} us") for what, s in spent.items()]
 
 
 def of_memory(mebibytes: float) -> list[Target]:

@@ -211,6 +211,7 @@ def test_lookup(table):
     assert worst["RegularGridInterpolator cubic"] < worst["RegularGridInterpolator linear"] < LOST
     assert worst["xarray.interp linear"] == pytest.approx(worst["RegularGridInterpolator linear"], rel=1e-6)
     assert set(construct) == set(worst) - {"this project"}
+    assert all(target.value > 0.0 for target in targets.of_lookup(rows) + targets.of_one_lookup(lookup.of_one(table)))
     errors = lookup.whole_domain(table, 2000)
     assert errors.pop("error estimates that hold") == 1.0
     assert max(errors.values()) < 1e-8

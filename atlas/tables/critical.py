@@ -28,7 +28,7 @@ METHOD = "fold"
 INTERPOLANT = "support/interpolant"  # the group of the series
 FIELDS = ("gamma", "R_x0", "x_f", "z_f")
 QUANTITIES = (*FIELDS, "tension", "error", "status")
-EPS = np.finfo(float).eps
+EPS = float(np.finfo(float).eps)
 MOST_SLACK = 1e-6
 ROUNDINGS = 48.0  # as in kernels.folds, whose import would bring numba (test_error_constants_agree)
 
