@@ -143,11 +143,8 @@ def takes_frames(function: F) -> F:
         if at is None:
             return function(*given, **named)
         frame = given[at]
-        lacking, twice = (
-            [name for name in needed if name not in frame],
-            [name for name in named if name in columns and name in frame],
-        )
-        if lacking or twice or given[at + 1 :]:
+        lacking = [name for name in needed if name not in frame]
+        if lacking or given[at + 1 :] or any(name in columns and name in frame for name in named):
             others = [name for name in columns if name not in needed]
             wrong = f"it lacks {', '.join(lacking)}" if lacking else "something is given twice"
             raise ValueError(
