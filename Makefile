@@ -39,6 +39,7 @@ bench: install  ## chart error against time, compare the ratios, update docs and
 	-$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[peers]'
 	$(BIN)/python -m benchmarks.models
 	$(BIN)/python -m benchmarks
+	$(BIN)/python -m benchmarks.waiting
 
 failures: install  ## map where methods fail, write the figure and the tables of docs/failures.md
 	$(BIN)/python -m benchmarks.failures

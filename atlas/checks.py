@@ -27,14 +27,51 @@ def short(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def check_real(name: str, value: Any) -> NDArray[np.float64]:
-    """Real numbers of any numeric dtype, as float64; masked values become nan.
+def without_unit(name: str, value: Any, unit: str = "") -> Any:
+    """What a pint quantity is in a unit; all else as it is.
+
+    Parameters
+    ----------
+    name : str
+        What it is called in messages.
+    value : object
+        A quantity, also in lists.
+    unit : str
+        Dimensionless by default.
+
+    Returns
+    -------
+    object
+
+    Raises
+    ------
+    ValueError
+        For a quantity of another dimension.
+    """
+    if isinstance(value, (list, tuple)):
+        return [without_unit(name, item, unit) for item in value]
+    # Whoever passes a quantity has imported pint.
+    if not hasattr(value, "dimensionality"):
+        return value
+    if not value.is_compatible_with(unit):
+        wanted = (
+            f"in {unit} or what converts to it" if unit else "dimensionless: a ratio, as of a length to the tow radius"
+        )
+        raise ValueError(f"{name} must be {wanted}, got {short(f'{value:~}')}")
+    return value.m_as(unit)
+
+
+def check_real(name: str, value: Any, unit: str = "") -> NDArray[np.float64]:
+    """Real numbers of any numeric dtype, as float64; masked values become nan, quantities numbers.
 
     Parameters
     ----------
     name : str
         What they are called in messages.
     value : array_like
+        Also pint quantities.
+    unit : str
+        In which quantities are meant; dimensionless by default.
 
     Returns
     -------
@@ -43,8 +80,14 @@ def check_real(name: str, value: Any) -> NDArray[np.float64]:
     Raises
     ------
     ValueError
-        For labelled arrays, and what is not real numbers.
+        For labelled arrays, quantities of another dimension, and what is not real numbers.
     """
+    value = without_unit(name, value, unit)
+    if hasattr(value, "iloc"):
+        raise ValueError(
+            f"{name} is a pandas {type(value).__name__}; this function pairs by position and takes plain arrays: pass "
+            f"{name}.to_numpy(), or a Series to what returns one quantity, or one DataFrame to what returns many"
+        )
     if hasattr(value, "dims"):
         raise ValueError(
             f"{name} is a labelled {type(value).__name__}; this function pairs by position and takes plain arrays: "
@@ -61,6 +104,32 @@ def check_real(name: str, value: Any) -> NDArray[np.float64]:
             f"{name} must be a real number or an array of them, got {short(value)} ({array.dtype}); convert it first"
         )
     return array.astype(np.float64)
+
+
+# Whole numbers beyond are no int64, which `check_real` refuses.
+_LARGEST = 2**63
+
+
+def one_number(value: Any) -> float | None:
+    """A number that needs no check and no conversion: what makes one lookup fast.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    float or None
+        None for all that `check_real` has to look at.
+    """
+    kind = type(value)
+    if kind is float:
+        return value
+    if kind is int:
+        return float(value) if -_LARGEST <= value < _LARGEST else None
+    if (isinstance(value, np.number) or kind is np.ndarray) and value.ndim == 0 and value.dtype.kind in "iuf":
+        return float(value)
+    return None
 
 
 def check_order(value: Any) -> NDArray[np.int64]:

@@ -1,11 +1,14 @@
 """Closed forms of the vacuum problem: thresholds and limits. Lengths over the tow radius, forces over (mu+rho A)gR."""
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from towatlas.checks import check_broadcast, check_order, check_positive_finite, check_real
+from towatlas.labelled import quantity_of
+from towatlas.nomenclature import SYMBOLS
 
 Array = NDArray[np.float64]
 
@@ -94,10 +97,14 @@ def threshold_length(w_f: ArrayLike, n: ArrayLike = 1) -> Array:
     >>> float(threshold_length(0.0, 2))
     4.0
     """
-    w_f = check_real("w_f", w_f)
-    check_positive_finite("w_f", w_f, zero=True)
-    w_f, n = check_broadcast(w_f=w_f, n=check_order(n))
-    return unchecked_threshold_length(w_f, n)
+
+    def plain(*, w_f: Any, n: Any) -> Array:
+        w_f = check_real("w_f", w_f)
+        check_positive_finite("w_f", w_f, zero=True)
+        w_f, n = check_broadcast(w_f=w_f, n=check_order(n))
+        return unchecked_threshold_length(w_f, n)
+
+    return quantity_of(plain, "lambda_c", SYMBOLS["lambda_c"].long_name, float, w_f=w_f, n=n)
 
 
 def excess_length(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Array:
@@ -132,11 +139,15 @@ def excess_length(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Array:
     >>> float(excess_length(10.0, 0.0, 1))
     8.0
     """
-    lam, w_f = check_real("lam", lam), check_real("w_f", w_f)
-    check_positive_finite("lam", lam)
-    check_positive_finite("w_f", w_f, zero=True)
-    lam, w_f, n = check_broadcast(lam=lam, w_f=w_f, n=check_order(n))
-    return unchecked_excess_length(lam=lam, w_f=w_f, n=n)
+
+    def plain(*, lam: Any, w_f: Any, n: Any) -> Array:
+        lam, w_f = check_real("lam", lam), check_real("w_f", w_f)
+        check_positive_finite("lam", lam)
+        check_positive_finite("w_f", w_f, zero=True)
+        lam, w_f, n = check_broadcast(lam=lam, w_f=w_f, n=check_order(n))
+        return unchecked_excess_length(lam=lam, w_f=w_f, n=n)
+
+    return quantity_of(plain, "excess", SYMBOLS["excess"].long_name, float, lam=lam, w_f=w_f, n=n)
 
 
 def transitions(*, lam: float, w_f: float) -> int:
@@ -181,9 +192,12 @@ def massless_cable(lam: ArrayLike) -> Array:
     >>> round(float(massless_cable(8.0)), 12)
     0.438691337651
     """
-    lam = np.asarray(lam, float)
-    base = np.cbrt(lam) ** 2 - 1.0
-    return np.where(base > 0.0, np.abs(base), np.nan) ** -0.75
+
+    def plain(*, lam: Any) -> Array:
+        base = np.cbrt(check_real("lam", lam)) ** 2 - 1.0
+        return np.where(base > 0.0, np.abs(base), np.nan) ** -0.75
+
+    return quantity_of(plain, "gamma", SYMBOLS["gamma"].long_name, float, lam=lam)
 
 
 def long_cable(n: ArrayLike) -> Array:

@@ -1,20 +1,22 @@
 """What the program answers with. Arrays of one answer have one shape; all numbers are dimensionless unless said."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.kernels import status as codes
+from towatlas.labelled import Answer
+from towatlas.nomenclature import EQUILIBRIUM, Symbol
 from towatlas.system import System
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-@dataclass(frozen=True)
-class CriticalStates:
+@dataclass(frozen=True, repr=False)
+class CriticalStates(Answer):
     """Critical states of towed cables in a vacuum; arrays of one shape, that of what was asked.
 
     Attributes
@@ -67,8 +69,8 @@ class CriticalStates:
         return codes.SENTENCES[int(self.status[index])]
 
 
-@dataclass(frozen=True)
-class Equilibria:
+@dataclass(frozen=True, repr=False)
+class Equilibria(Answer):
     """Equilibria of one cable at one speed in any medium, in rising order of R_x0.
 
     The tow point is at (1, 0, 0) and moves along y in a turn to starboard, against it in one to port; z points down.
@@ -109,6 +111,9 @@ class Equilibria:
         What was searched, and whether the list is complete.
     """
 
+    DIMENSION: ClassVar[str] = "shape"
+    SYMBOLS: ClassVar[dict[str, Symbol]] = EQUILIBRIUM
+
     system: System
     gamma: float
     R_x0: Array
@@ -132,8 +137,8 @@ class Equilibria:
         return len(self.R_x0)
 
 
-@dataclass(frozen=True)
-class Folds:
+@dataclass(frozen=True, repr=False)
+class Folds(Answer):
     """Folds of one cable as one of its numbers moves, in rising order of it: at each two shapes meet.
 
     Attributes
@@ -163,6 +168,9 @@ class Folds:
     searched : str
         What was looked at, in words.
     """
+
+    DIMENSION: ClassVar[str] = "fold"
+    SYMBOLS: ClassVar[dict[str, Symbol]] = EQUILIBRIUM
 
     system: System
     moved: str
@@ -217,8 +225,8 @@ class Folds:
         return replace(self, **{name: getattr(self, name)[which] for name in columns})
 
 
-@dataclass(frozen=True)
-class Cusps:
+@dataclass(frozen=True, repr=False)
+class Cusps(Answer):
     """Cusps of one cable as its speed and one other of its numbers move, in rising order of that number.
 
     Attributes
@@ -241,6 +249,9 @@ class Cusps:
         What was looked at, in words.
     """
 
+    DIMENSION: ClassVar[str] = "cusp"
+    SYMBOLS: ClassVar[dict[str, Symbol]] = EQUILIBRIUM
+
     system: System
     moved: str
     value: Array
@@ -254,8 +265,8 @@ class Cusps:
         return len(self.value)
 
 
-@dataclass(frozen=True)
-class FishPositions:
+@dataclass(frozen=True, repr=False)
+class FishPositions(Answer):
     """Where the fish is on one branch of the equilibria in a vacuum; arrays of one shape, that of what was asked.
 
     Attributes
@@ -278,6 +289,8 @@ class FishPositions:
         Whether the answer comes from the table; else it was solved directly.
     """
 
+    SYMBOLS: ClassVar[dict[str, Symbol]] = EQUILIBRIUM
+
     lam: Array
     w_f: Array
     gamma: Array
@@ -293,8 +306,8 @@ class FishPositions:
 SIDES = ("appears", "ends", "again")
 
 
-@dataclass(frozen=True)
-class DragFolds:
+@dataclass(frozen=True, repr=False)
+class DragFolds(Answer):
     """Folds of towed cables in a nondense fluid; arrays of one shape, that of what was asked.
 
     nan where a status says why.

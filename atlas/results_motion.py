@@ -1,22 +1,25 @@
 """What the program answers about motions of a cable: which shapes last. All numbers are dimensionless unless said."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.kernels import status as codes
 from towatlas.kernels.system import COLUMNS
+from towatlas.labelled import Answer
+from towatlas.nomenclature import EQUILIBRIUM, Symbol
 from towatlas.results import Array, Equilibria, Integers
 from towatlas.system import System
 
 if TYPE_CHECKING:
+    import pandas
     import xarray
 
 
-@dataclass(frozen=True)
-class Stability:
+@dataclass(frozen=True, repr=False)
+class Stability(Answer):
     """Growth rates of small motions about the equilibria of one cable at one speed, in the order of these.
 
     Times are in sqrt(R/g). A motion grows as exp(growth t) and turns by frequency t.
@@ -45,6 +48,9 @@ class Stability:
     looked_at : str
         Which were looked for.
     """
+
+    DIMENSION: ClassVar[str] = "shape"
+    SYMBOLS: ClassVar[dict[str, Symbol]] = EQUILIBRIUM
 
     equilibria: Equilibria
     growth: Array
@@ -113,8 +119,8 @@ class Window:
     weak: bool
 
 
-@dataclass(frozen=True)
-class Flutter:
+@dataclass(frozen=True, repr=False)
+class Flutter(Answer):
     """Ranges of speed in which shapes of one cable do not last.
 
     Attributes
@@ -131,6 +137,8 @@ class Flutter:
         In words.
     """
 
+    DIMENSION: ClassVar[str] = "window"
+
     system: System
     low: float
     high: float
@@ -138,9 +146,18 @@ class Flutter:
     complete: bool
     looked_at: str
 
+    def columns(self) -> dict[str, Any]:
+        """The windows as arrays, by field.
 
-@dataclass(frozen=True)
-class Boundary:
+        Returns
+        -------
+        dict of ndarray, shape (windows,)
+        """
+        return {field.name: np.array([getattr(one, field.name) for one in self.windows]) for field in fields(Window)}
+
+
+@dataclass(frozen=True, repr=False)
+class Boundary(Answer):
     """Where the inner member of the n-th pair in a vacuum begins or ceases to flutter, as a curve over the length.
 
     Attributes
@@ -174,6 +191,15 @@ class Boundary:
     turns: Integers
     error: Array
     kinds: tuple[str, str]
+
+    def columns(self) -> dict[str, Any]:
+        """The curve as arrays, by field; `turns` as whether a point is one.
+
+        Returns
+        -------
+        dict of ndarray, shape (points,)
+        """
+        return super().columns() | {"turns": np.isin(np.arange(len(self.lam)), self.turns)}
 
 
 @dataclass(frozen=True)
@@ -295,6 +321,25 @@ class Diagram:
             facts["gamma"] = float(self.branches[0].gamma[0])
         found = dataset_of(self.branches, self.moved, dict.fromkeys(DIAGRAM_UNITS, "1"))
         return found.assign_attrs(looked_at=self.looked_at, **facts)
+
+    def to_dataframe(self) -> "pandas.DataFrame":
+        """The samples of all branches as a table.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row a sample, with the name of its branch.
+        """
+        import pandas
+
+        columns = ("value", *(name for name in _DIAGRAM if name != "value"), "kind")
+        frames = [
+            pandas.DataFrame({"name": one.name, **{name: getattr(one, name) for name in columns}})
+            for one in self.branches
+        ]
+        return pandas.concat(frames, keys=range(len(frames)), names=["branch", "sample"]).rename(
+            columns={"value": self.moved}
+        )
 
 
 def dataset_of(branches: tuple[Branch, ...], moved: str, units: dict[str, str]) -> "xarray.Dataset":

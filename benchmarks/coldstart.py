@@ -58,9 +58,10 @@ print(summary.seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 
 
 def build() -> tuple[float, float]:
-    """Seconds and peak resident memory [MiB] of the default build, in a process of its own."""
+    """Seconds and peak resident memory [MiB] of the default build, in a process of its own that compiles nothing."""
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-c", BUILD, str(Path(folder) / "atlas.nc")]
-        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        # The first compiles what is not compiled, which takes more memory than the build.
+        _, done = [subprocess.run(command, capture_output=True, text=True, check=True) for _ in range(2)]
     spent, kilobytes = done.stdout.split()
     return float(spent), float(kilobytes) / 1024.0

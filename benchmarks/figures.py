@@ -1,6 +1,7 @@
 """The charts: error against time, both logarithmic, failures marked."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib
 
@@ -11,6 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from benchmarks.timing import LOST, Row
+
+if TYPE_CHECKING:
+    from benchmarks.waiting import Wait
 
 FLOOR = 1e-17
 OURS = "#c1121f"
@@ -256,4 +260,25 @@ def lookup(rows: list[Row], path: Path) -> None:
     handles, labels = both[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="center left", bbox_to_anchor=(0.91, 0.5), frameon=False)
     figure.text(0.125, -0.03, KEY + " The same 96 x 112 nodes for all.", fontsize=8.5)
+    _finish(figure, path)
+
+
+def waiting(rows: list[tuple["Wait", "Wait | None"]], path: Path) -> None:
+    """What a user waits for whole commands: from what it was, where known, to what it is."""
+    figure, axes = plt.subplots(figsize=(8.5, 0.42 * len(rows) + 1.3))
+    looks = {"cold": ("nothing compiled", OURS, 0.16), "warm": ("afterwards", "#2f7ed8", -0.16)}
+    for kind, (label, colour, up) in looks.items():
+        for k, (now, before) in enumerate(rows):
+            there, value = len(rows) - 1 - k + up, getattr(now, kind)
+            was = getattr(before, kind) if before else np.nan
+            if np.isfinite(was):
+                axes.plot([was, value], [there, there], "-", color=colour, lw=1.4, alpha=0.45, zorder=2)
+                axes.plot(was, there, "o", mfc="white", mec=colour, ms=6, label=f"{label}, before" if not k else None)
+            axes.plot(value, there, "o", color=colour, ms=6, label=f"{label}, now" if not k else None)
+    axes.set_yticks(range(len(rows)), [now.command for now, _ in reversed(rows)])
+    axes.set(xscale="log", xlabel="CPU time of the whole command [s]", ylim=(-0.7, len(rows) - 0.3))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.grid(True, axis="x", which="major", lw=0.4, color="0.85")
+    axes.set_axisbelow(True)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=4, frameon=False, handletextpad=0.1)
     _finish(figure, path)

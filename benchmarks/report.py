@@ -52,10 +52,29 @@ def targets_table(found: list[Target]) -> str:
     """Markdown."""
     lines = ["| ratio | measured | at least | | |", "|---|---|---|---|---|"]
     for t in found:
-        value = f"{t.value:,.0f}" if t.value >= 100 else f"{t.value:.3g}"
         wanted = "" if t.wanted is None else f"{t.wanted:g}"
-        lines.append(f"| {t.name} | {value} | {wanted} | {t.verdict} | {t.note} |")
+        lines.append(f"| {t.name} | {_ratio(t.value)} | {wanted} | {t.verdict} | {t.note} |")
     return "\n".join(lines) + "\n"
+
+
+def ratios_table(entries: dict[str, list[Target]]) -> str:
+    """Markdown: a column for each processor; what one of them does not reach is said."""
+    by_name = {name: {target.name: target for target in found} for name, found in entries.items()}
+    lines = ["| ratio | at least | " + " | ".join(entries) + " | | |", "|---|---|" + "---|" * len(entries) + "---|---|"]
+    for name in dict.fromkeys(target.name for found in entries.values() for target in found):
+        there = {processor: targets[name] for processor, targets in by_name.items() if name in targets}
+        first = next(iter(there.values()))
+        cells = [_ratio(there[processor].value) if processor in there else "" for processor in entries]
+        short = [processor for processor, target in there.items() if target.verdict == "not reached"]
+        everywhere = len(short) == len(entries)
+        verdict = f"not reached{'' if everywhere else ': ' + ', '.join(short)}" if short else first.verdict
+        wanted = "" if first.wanted is None else f"{first.wanted:g}"
+        lines.append(f"| {' | '.join([name, wanted, *cells, verdict, first.note])} |")
+    return "\n".join(lines) + "\n"
+
+
+def _ratio(value: float) -> str:
+    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def cold_table(rows: list[tuple[str, float, float]]) -> str:

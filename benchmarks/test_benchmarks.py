@@ -1,7 +1,6 @@
 """The benchmarks, run once with small sizes so that they cannot rot. No test asserts a time."""
 
 import csv
-import json
 
 import numpy as np
 import pytest
@@ -23,6 +22,7 @@ from benchmarks import (
     stability,
     targets,
     targets_drag,
+    waiting,
 )
 from benchmarks.timing import LOST, Row
 from towatlas.limits import threshold_length
@@ -211,6 +211,7 @@ def test_lookup(table):
     assert worst["RegularGridInterpolator cubic"] < worst["RegularGridInterpolator linear"] < LOST
     assert worst["xarray.interp linear"] == pytest.approx(worst["RegularGridInterpolator linear"], rel=1e-6)
     assert set(construct) == set(worst) - {"this project"}
+    assert all(target.value > 0.0 for target in targets.of_lookup(rows) + targets.of_one_lookup(lookup.of_one(table)))
     errors = lookup.whole_domain(table, 2000)
     assert errors.pop("error estimates that hold") == 1.0
     assert max(errors.values()) < 1e-8
@@ -248,13 +249,39 @@ def test_guard_names_what_got_worse(tmp_path, monkeypatch):
     kept = [targets.Target("a", 10.0, 9.0), targets.Target("b", 10.0, None)]
     assert "no committed ratios" in targets.compare(kept, path)[0]
     targets.keep(kept, path)
-    assert json.loads(path.read_text())["ratios"] == {"a": 10.0, "b": 10.0}
+    assert targets.kept(path)[targets.processor()] == kept
     assert "no ratio is worse" in targets.compare([targets.Target("a", 8.6, 9.0), kept[1]], path)[0]
     verdict = targets.compare([targets.Target("a", 8.4, 9.0)], path)
     assert verdict[0].startswith("WORSE: a")
     assert verdict[1] == "not measured: b"
     monkeypatch.setattr(targets, "processor", lambda: "another")
     assert targets.compare(kept, path)[0].startswith("not compared")
+
+
+def test_each_processor_keeps_its_ratios(tmp_path, monkeypatch):
+    """And what one of them does not reach is in the table, with its name."""
+    path = tmp_path / "ratios.json"
+    for name, value in (("first", 10.0), ("second", 8.0), ("second", 8.5)):
+        monkeypatch.setattr(targets, "processor", lambda name=name: name)
+        targets.keep([targets.Target("a", value, 9.0, f"of {name}"), targets.Target(name, 1.0, None)], path)
+    entries = targets.kept(path)
+    assert [entries[name][0].value for name in ("first", "second")] == [10.0, 8.5]
+    table = report.ratios_table(entries).splitlines()
+    assert table[0] == "| ratio | at least | first | second | | |"
+    assert table[2] == "| a | 9 | 10 | 8.5 | not reached: second | of first |"
+    assert table[4] == "| second |  |  | 1 | watched |  |"
+    assert len({line.count("|") for line in table}) == 1
+
+
+def test_waiting(tmp_path):
+    """Of the shortest command; a command that was measured before is one that is measured."""
+    assert set(waiting.before()) == set(waiting.COMMANDS)
+    version = waiting.measure({"critical": "--version"}, repeats=1)
+    assert version[0].cold > 0.0
+    earlier = {"critical": waiting.Wait("critical", 12.0, float("nan"))}
+    assert waiting.table(version, earlier).splitlines()[2].startswith("| critical | 12 s | ")
+    figures.waiting([(version[0], earlier["critical"])], tmp_path / "waiting")
+    assert {path.suffix for path in tmp_path.iterdir()} == {".svg", ".png"}
 
 
 def test_targets_say_whether_they_are_reached():

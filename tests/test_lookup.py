@@ -9,11 +9,13 @@ import xarray as xr
 from helpers import random_cables
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from numpy.polynomial.chebyshev import chebval2d
 
 import towatlas
 from towatlas.kernels import folds as extract
 from towatlas.kernels import status
 from towatlas.limits import threshold_length
+from towatlas.numerics.cells import BLOCK, Cells, Places, Work
 from towatlas.tables import critical as lookup
 
 QUANTITIES = ("gamma", "R_x0", "x_f", "z_f", "tension")
@@ -30,6 +32,106 @@ def test_lookup_is_the_direct_solution_everywhere(atlas_file):
     miss = np.abs(found.gamma / exact.gamma - 1)
     assert (miss <= found.error + exact.error).all()
     assert np.median(found.error) < 1e-10
+
+
+def test_cells_are_the_series_of_the_atlas(atlas_file):
+    """What lookup sums against the whole series of the file, by numpy's sum; where the states bend most, too."""
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(-1, 1, (2, 6000))
+    y[:1000] = -1 + 10.0 ** rng.uniform(-8, 0, 1000)
+    x[1000:2000], y[1000:2000] = rng.uniform(-0.5, 0.0, 1000), rng.uniform(-0.3, 0.1, 1000)
+    x[2000:2004], y[2000:2004] = [-1, -1, 1, 1], [-1, 1, -1, 1]
+    for name in lookup.FIELDS:
+        for n in (1, 2, 6):
+            series = atlas_file.critical.series(name, n)
+            table, work = Cells(series), Work(len(x))
+            parts = [slice(begin, begin + BLOCK) for begin in range(0, len(x), BLOCK)]
+            found = np.concatenate([table.sums(Places(x[part], y[part]), work) for part in parts])
+            # Of fields to 10, whose sum rounds at 1e-14; a hundredth of the errors that the file states.
+            assert np.abs(found - chebval2d(y, x, series)).max() < 2e-13, (name, n)
+
+
+def as_array(atlas, lam, w_f, n, outside="raise"):
+    """The state of one cable by the way of arrays."""
+    return atlas.states([lam], [w_f], [n], outside=outside)
+
+
+def test_one_cable_is_answered_as_many_are(atlas_file):
+    """The scalar path: the same errors and status to the bit, the same values to the rounding of a sum of 45 terms."""
+    n, w_f, lam = random_cables(3000, 11)
+    many = atlas_file.states(lam, w_f, n)
+    for k in range(len(n)):
+        one = atlas_file.states(float(lam[k]), float(w_f[k]), int(n[k]))
+        assert one.error == many.error[k]
+        assert one.status == many.status[k] == status.OK
+        for name in QUANTITIES:
+            assert getattr(one, name) == pytest.approx(getattr(many, name)[k], rel=2e-14, abs=0), (k, name)
+    for method, name in zip(METHODS, (*QUANTITIES, "error", "status"), strict=True):
+        value = getattr(atlas_file, method)(float(lam[0]), float(w_f[0]), int(n[0]))
+        assert value == pytest.approx(getattr(many, name)[0], rel=2e-14, abs=0)
+        assert value.dtype == getattr(many, name).dtype
+
+
+def test_one_cable_at_the_edges_is_answered_as_many_are(atlas_file):
+    """At and an ulp or a few beside each end of the domain, and next to the threshold: the same points are held."""
+    codes = set()
+    for n in (1, 3, 6):
+        for w_f in (0.0, -0.0, 5e-324, 1e-12, 1.0, 1e4, np.nextafter(1e4, np.inf), -1.0):
+            threshold = float(threshold_length(abs(w_f), n))
+            for excess in (0.0, 1e-16, 1e-3, 1.0, 1e3):
+                for ulps in range(-9, 10, 3):
+                    lam = threshold + excess
+                    lam += ulps * np.spacing(lam)
+                    one, many = atlas_file.states(lam, w_f, n, "nan"), as_array(atlas_file, lam, w_f, n, "nan")
+                    assert one.status == many.status[0], (lam, w_f, n)
+                    assert one.gamma == pytest.approx(many.gamma[0], rel=2e-14, nan_ok=True)
+                    np.testing.assert_equal(float(one.error), float(many.error[0]))
+                    codes.add(int(one.status))
+    assert codes == {status.OK, status.OUTSIDE, status.NO_TRANSITION, status.BAD_INPUT}
+
+
+@pytest.mark.parametrize(
+    ("lam", "w_f", "n"),
+    [
+        (np.nan, 1.0, 1),
+        (10.0, np.nan, 1),
+        (np.inf, 1.0, 1),
+        (10.0, np.inf, 1),
+        (10.0, 1.0, np.nan),
+        (10.0, 1.0, 0),
+        (10.0, 1.0, 1.5),
+        (100.0, 1.0, 7),
+        (10.0, 1.0, 2**31),
+        (10.0, 1.0, 2**70),
+        (2**64, 1.0, 1),
+        pytest.param(10**400, 1.0, 1, id="huge"),
+        (True, 1.0, 1),
+        (10.0, "1", 1),
+        (10.0, 1.0, None),
+        (5000.0, 1.0, 1),
+        (-3.0, 1.0, 1),
+    ],
+)
+def test_one_cable_is_refused_as_many_are(atlas_file, lam, w_f, n):
+    with pytest.raises(ValueError, match=r"lam|w_f|n counts|n must|n =") as one:
+        atlas_file.critical_speed(lam, w_f, n)
+    with pytest.raises(ValueError, match=r"lam|w_f|n counts|n must|n =") as many:
+        atlas_file.critical_speed([lam], w_f, n)
+    # But for the brackets of an array where a value is quoted.
+    assert str(one.value).split("got")[0] == str(many.value).split("got")[0]
+
+
+def test_numbers_of_any_kind_are_one_cable(atlas_file):
+    expected = as_array(atlas_file, 10.0, 2.0, 2)
+    for kind in (float, int, np.float64, np.int64, np.int8, np.uint64, np.float32, np.longdouble, np.array):
+        found = atlas_file.states(kind(10), kind(2), kind(2))
+        assert found.gamma.shape == ()
+        for name in ("n", "lam", "w_f", "status", *QUANTITIES):
+            value = getattr(found, name)
+            assert value.dtype == getattr(expected, name).dtype
+            assert value == pytest.approx(getattr(expected, name)[0], rel=2e-14)
+    masked = np.ma.masked_array(10.0, mask=True)
+    assert np.isnan(atlas_file.critical_speed(masked, 1.0, outside="nan"))
 
 
 def test_edges_and_corners_of_the_domain(atlas_file):

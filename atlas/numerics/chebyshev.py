@@ -1,16 +1,7 @@
-"""Chebyshev series: through values on their nodes, and their sums at points, on grids, and by patches."""
-
-from collections.abc import Mapping, Sequence
+"""Chebyshev series: through values on their nodes, and their sums at points and on grids."""
 
 import numpy as np
 from numpy.typing import NDArray
-
-# Patches along each axis, and nodes of a patch along each: measured to agree with the whole series within 1e-13.
-PATCHES = 16
-PATCH_NODES = 20
-# Points evaluated together, whose polynomials then stay in the cache; and points of one matrix product, few enough that
-# BLAS does not wake its threads, whose waiting costs more than the work.
-BLOCK, PRODUCT = 4096, 512
 
 Array = NDArray[np.float64]
 
@@ -114,30 +105,6 @@ def coefficients(values: Array) -> Array:
     return values
 
 
-def _patch_edges() -> Array:
-    return nodes(PATCHES + 1)
-
-
-def patches(series: Array) -> Array:
-    """Short series on PATCHES^2 parts of the unit square that sum to one long series, to 1e-13.
-
-    A sum of four hundred terms instead of ten thousand: what makes lookup fast.
-
-    Parameters
-    ----------
-    series : ndarray, shape (y degree, x degree)
-
-    Returns
-    -------
-    ndarray, shape (PATCHES, PATCHES, PATCH_NODES, PATCH_NODES)
-        y first.
-    """
-    edges = _patch_edges()
-    at = (0.5 * (edges[1:] + edges[:-1])[:, None] + 0.5 * np.diff(edges)[:, None] * nodes(PATCH_NODES)).ravel()
-    values = polynomials(at, series.shape[0]).T @ (series @ polynomials(at, series.shape[1]))
-    return coefficients(values.reshape(PATCHES, PATCH_NODES, PATCHES, PATCH_NODES).swapaxes(1, 2))
-
-
 def equal_patches(series: Array, counts: tuple[int, int], terms: int) -> Array:
     """Short series on equal parts of the unit square, from long ones.
 
@@ -163,52 +130,6 @@ def equal_patches(series: Array, counts: tuple[int, int], terms: int) -> Array:
     values = np.einsum("...pi,qi->...qp", values, along_y, optimize=False)
     shape = (*series.shape[:-2], counts[0], terms, counts[1], terms)
     return coefficients(values.reshape(shape).swapaxes(-3, -2))
-
-
-def patch_sums(tables: Sequence[Mapping[int, Array]], n: NDArray[np.int64], x: Array, y: Array) -> list[Array]:
-    """Values at points of several tables.
-
-    Parameters
-    ----------
-    tables : sequence of mapping
-        tables[k][n] are the `patches` of one n.
-    n : ndarray of int, shape (points,)
-    x, y : ndarray, shape (points,)
-        -1 to 1.
-
-    Returns
-    -------
-    list of ndarray, shape (points,)
-        One for each table.
-    """
-    edges = _patch_edges()
-    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-    column, row = _patch_at(x), _patch_at(y)
-    # Points of one patch together: then each patch is one small matrix product.
-    patch = ((n * PATCHES + row) * PATCHES + column).astype(np.uint16 if n.max() < 200 else np.int64)
-    order = np.argsort(patch, kind="stable")
-    patch, column, row, x, y = patch[order], column[order], row[order], x[order], y[order]
-    results = [np.empty(len(x)) for _ in tables]
-    for begin in range(0, len(x), BLOCK):
-        block = slice(begin, begin + BLOCK)
-        along_x = polynomials((x[block] - middle[column[block]]) / half[column[block]], PATCH_NODES)
-        along_y = polynomials((y[block] - middle[row[block]]) / half[row[block]], PATCH_NODES)
-        inside = patch[block]
-        changes = (np.flatnonzero(inside[1:] != inside[:-1]) + 1).tolist()
-        ends = sorted({*changes, *range(PRODUCT, len(inside), PRODUCT), len(inside)})
-        for first, last in zip([0, *ends[:-1]], ends, strict=True):
-            place = begin + first
-            which, at = int(inside[first]) // PATCHES**2, (row[place], column[place])
-            for table, result in zip(tables, results, strict=True):
-                terms = table[which][at] @ along_x[:, first:last]
-                terms *= along_y[:, first:last]
-                result[order[place : begin + last]] = terms.sum(axis=0)
-    return results
-
-
-def _patch_at(x: Array) -> NDArray[np.int64]:
-    """Which of the PATCHES a coordinate lies in; on an edge either will do."""
-    return np.clip(((0.5 + np.arcsin(x) / np.pi) * PATCHES).astype(np.int64), 0, PATCHES - 1)
 
 
 def on_grid(series: Array, y: Array, x: Array) -> Array:

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from towatlas.effort import check_foreseen, check_patience
 from towatlas.kernels import status
+from towatlas.labelled import Answer
 from towatlas.limits import transitions
 from towatlas.results import Equilibria, Folds
 from towatlas.scene.angles import Angles, angles_along, extrapolation
@@ -36,8 +37,8 @@ BLOCK = 6
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Jumps:
+@dataclass(frozen=True, repr=False)
+class Jumps(Answer):
     """Critical speeds of one cable in a vacuum, in rising order.
 
     Attributes
@@ -55,6 +56,8 @@ class Jumps:
     existing : int
         How many transitions the cable has in all, >= 0.
     """
+
+    DIMENSION: ClassVar[str] = "transition"
 
     n: NDArray[np.int64]
     gamma: Array
@@ -78,7 +81,7 @@ class Jumps:
         return np.abs(self.gamma / gamma - 1.0) <= NEAR
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SceneAnswer:
     """A scene, the model chosen for it and what that one answers.
 
@@ -101,6 +104,12 @@ class SceneAnswer:
     choice: Choice
     folds: Folds | None
     angles: list[Angles | None]
+
+    def __repr__(self) -> str:
+        held = {"jumps": self.jumps, "folds": self.folds, "equilibria": self.equilibria}
+        parts = [f"SceneAnswer to {self.scene.title!r}: {self.choice.reason}"]
+        parts += [f"{name}: {value!r}" for name, value in held.items() if value is not None]
+        return "\n".join(parts)
 
     @property
     def notes(self) -> list[str]:

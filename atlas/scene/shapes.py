@@ -45,7 +45,7 @@ def shape_in_si(
     from towatlas.cf import scene_shape_attributes, with_units
 
     k = check_root(root, found.branch, found.expected, len(found) // 2 if found.system.in_vacuum else -1)
-    arc = np.linspace(0.0, scene.length, POINTS) if s is None else np.atleast_1d(check_real("s", s))
+    arc = np.linspace(0.0, scene.length, POINTS) if s is None else np.atleast_1d(check_real("s", s, "m"))
     if arc.ndim != 1 or not ((arc >= 0.0) & (arc <= scene.length)).all():
         raise ValueError(f"s must be a list of arc lengths from 0 to {scene.length:.15g} m, the length of the cable")
     with patient_with(scene):

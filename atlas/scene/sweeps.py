@@ -103,7 +103,9 @@ def sweep(
     """
     members = [scene] if isinstance(scene, Scene) else list(scene)
     given = {
-        name: check_real(name, value) for name, value in (("length", length), ("speed", speed)) if value is not None
+        name: check_real(name, value, unit)
+        for name, value, unit in (("length", length, "m"), ("speed", speed, "m/s"))
+        if value is not None
     }
     if len(given) != 1 or not members:
         raise ValueError("exactly one of length and speed is swept, and one scene or more")

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from towatlas.checks import check_broadcast, check_order, check_positive_finite, check_real
 from towatlas.effort import check_foreseen, check_patience, patience, scaled
 from towatlas.kernels import status
+from towatlas.labelled import takes_frames
 from towatlas.limits import unchecked_excess_length
 from towatlas.results import CriticalStates
 from towatlas.solve.batches import batches
@@ -82,6 +83,7 @@ def solve_rows(
     }
 
 
+@takes_frames
 def solve_critical(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> CriticalStates:
     """Critical states of towed cables, each solved directly.
 

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from towatlas.checks import check_broadcast, check_order, check_positive_finite, check_real
 from towatlas.effort import patience
 from towatlas.kernels import status
+from towatlas.labelled import takes_frames
 from towatlas.limits import unchecked_excess_length
 from towatlas.numerics.curves import Curve, Steps, follow
 from towatlas.numerics.hermite import cubic
@@ -334,6 +335,7 @@ def fold_at_speed(guess: Array, log_gamma: Array, *, lam: Array, w_f: Array) -> 
     return z, solved
 
 
+@takes_frames
 def solve_drag_folds(lam: ArrayLike, w_f: ArrayLike, C: ArrayLike, n: ArrayLike = 1) -> DragFolds:
     """Folds of cables towed in a nondense fluid (m_f = w_f, w = 1), each solved directly.
 

@@ -1,11 +1,10 @@
 """Answers from a file, whichever it holds. Needs numpy and netCDF4 only."""
 
 import os
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from towatlas.checks import (
@@ -14,8 +13,10 @@ from towatlas.checks import (
     check_order,
     check_outside,
     check_real,
+    one_number,
 )
-from towatlas.nomenclature import SYMBOLS, Symbol
+from towatlas.labelled import quantity_of, takes_frames
+from towatlas.nomenclature import SYMBOLS
 from towatlas.results import CriticalStates, DragFolds, FishPositions
 from towatlas.tables.critical import QUANTITIES, CriticalTable
 from towatlas.tables.drag_folds import DragFoldTable
@@ -63,7 +64,9 @@ class Atlas:
 
     `fish` says where the fish is at any speed, `folds` where pairs of equilibria appear and end with drag, `states` all
     quantities of the critical states. Each of `critical_speed`, `reaction`, `fish_offset`, `fish_depth`, `tow_tension`,
-    `error` and `status` returns one of them, and takes xarray DataArrays, too.
+    `error` and `status` returns one of them, and takes xarray DataArrays (chunked ones lazily) and pandas Series (by
+    their labels), too; `states`, `fish` and `folds` take a DataFrame with their arguments as columns, and return one.
+    pint quantities are made dimensionless, or refused.
 
     Attributes
     ----------
@@ -151,6 +154,7 @@ class Atlas:
             )
         return self._parts[part]
 
+    @takes_frames
     def states(self, lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1, outside: str = "raise") -> CriticalStates:
         """All quantities of the critical states, with error estimate and status.
 
@@ -184,6 +188,10 @@ class Atlas:
         ['no such transition: the cable is not longer than lambda_cn', 'computed']
         """
         check_outside(outside)
+        if one := self._one(QUANTITIES, lam, w_f, n):
+            whole = {"n": np.int64, "status": np.int8}
+            given = {"n": n, "lam": lam, "w_f": w_f} | one
+            return CriticalStates(**{name: np.array(value, whole.get(name, float)) for name, value in given.items()})
         lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
         table = self.critical.answer(QUANTITIES, outside, lam=lam.ravel(), w_f=w_f.ravel(), n=n.ravel())
         return CriticalStates(n=n, lam=lam, w_f=w_f, **_shaped(table, n))
@@ -193,16 +201,16 @@ class Atlas:
 
         Parameters
         ----------
-        lam, w_f : array_like or DataArray
+        lam, w_f : array_like, DataArray or Series
             Cable length over tow radius, fish weight over (mu + rho A) g R [-].
-        n : array_like of int or DataArray
+        n : array_like of int, DataArray or Series
             Number of the transition, >= 1.
         outside : {"raise", "nan", "solve"}
             What becomes of points that the table does not hold; see the class.
 
         Returns
         -------
-        float, ndarray or DataArray
+        float, ndarray, DataArray or Series
             [-], > 0; relative error estimate: `error`.
         """
         return self._quantity("gamma", lam, w_f, n, outside)
@@ -212,16 +220,16 @@ class Atlas:
 
         Parameters
         ----------
-        lam, w_f : array_like or DataArray
+        lam, w_f : array_like, DataArray or Series
             Cable length over tow radius, fish weight over (mu + rho A) g R [-].
-        n : array_like of int or DataArray
+        n : array_like of int, DataArray or Series
             Number of the transition, >= 1.
         outside : {"raise", "nan", "solve"}
             What becomes of points that the table does not hold; see the class.
 
         Returns
         -------
-        float, ndarray or DataArray
+        float, ndarray, DataArray or Series
             Over (mu + rho A) g R [-]; negative.
         """
         return self._quantity("R_x0", lam, w_f, n, outside)
@@ -231,16 +239,16 @@ class Atlas:
 
         Parameters
         ----------
-        lam, w_f : array_like or DataArray
+        lam, w_f : array_like, DataArray or Series
             Cable length over tow radius, fish weight over (mu + rho A) g R [-].
-        n : array_like of int or DataArray
+        n : array_like of int, DataArray or Series
             Number of the transition, >= 1.
         outside : {"raise", "nan", "solve"}
             What becomes of points that the table does not hold; see the class.
 
         Returns
         -------
-        float, ndarray or DataArray
+        float, ndarray, DataArray or Series
             Over tow radius [-], with the sign of (-1)^n.
         """
         return self._quantity("x_f", lam, w_f, n, outside)
@@ -250,16 +258,16 @@ class Atlas:
 
         Parameters
         ----------
-        lam, w_f : array_like or DataArray
+        lam, w_f : array_like, DataArray or Series
             Cable length over tow radius, fish weight over (mu + rho A) g R [-].
-        n : array_like of int or DataArray
+        n : array_like of int, DataArray or Series
             Number of the transition, >= 1.
         outside : {"raise", "nan", "solve"}
             What becomes of points that the table does not hold; see the class.
 
         Returns
         -------
-        float, ndarray or DataArray
+        float, ndarray, DataArray or Series
             Below the tow point over tow radius [-], > 0.
         """
         return self._quantity("z_f", lam, w_f, n, outside)
@@ -269,16 +277,16 @@ class Atlas:
 
         Parameters
         ----------
-        lam, w_f : array_like or DataArray
+        lam, w_f : array_like, DataArray or Series
             Cable length over tow radius, fish weight over (mu + rho A) g R [-].
-        n : array_like of int or DataArray
+        n : array_like of int, DataArray or Series
             Number of the transition, >= 1.
         outside : {"raise", "nan", "solve"}
             What becomes of points that the table does not hold; see the class.
 
         Returns
         -------
-        float, ndarray or DataArray
+        float, ndarray, DataArray or Series
             Over (mu + rho A) g R [-], > 0.
         """
         return self._quantity("tension", lam, w_f, n, outside)
@@ -288,16 +296,16 @@ class Atlas:
 
         Parameters
         ----------
-        lam, w_f : array_like or DataArray
+        lam, w_f : array_like, DataArray or Series
             Cable length over tow radius, fish weight over (mu + rho A) g R [-].
-        n : array_like of int or DataArray
+        n : array_like of int, DataArray or Series
             Number of the transition, >= 1.
         outside : {"raise", "nan", "solve"}
             What becomes of points that the table does not hold; see the class.
 
         Returns
         -------
-        float, ndarray or DataArray
+        float, ndarray, DataArray or Series
             [-], > 0.
         """
         return self._quantity("error", lam, w_f, n, outside)
@@ -307,20 +315,21 @@ class Atlas:
 
         Parameters
         ----------
-        lam, w_f : array_like or DataArray
+        lam, w_f : array_like, DataArray or Series
             Cable length over tow radius, fish weight over (mu + rho A) g R [-].
-        n : array_like of int or DataArray
+        n : array_like of int, DataArray or Series
             Number of the transition, >= 1.
         outside : {"raise", "nan", "solve"}
             What becomes of points that the table does not hold; see the class.
 
         Returns
         -------
-        int8, ndarray or DataArray
+        int8, ndarray, DataArray or Series
             Of `towatlas.kernels.status`.
         """
         return self._quantity("status", lam, w_f, n, outside)
 
+    @takes_frames
     def fish(
         self,
         lam: ArrayLike,
@@ -377,6 +386,7 @@ class Atlas:
         table = self.positions.answer(branch, outside, near, lam=lam.ravel(), w_f=w_f.ravel(), gamma=gamma.ravel())
         return FishPositions(lam=lam, w_f=w_f, gamma=gamma, **_shaped(table, lam))
 
+    @takes_frames
     def folds(
         self, lam: ArrayLike, w_f: ArrayLike, C: ArrayLike, n: ArrayLike = 1, outside: str = "raise"
     ) -> DragFolds:
@@ -415,30 +425,25 @@ class Atlas:
         return DragFolds(n=n, lam=lam, w_f=w_f, C=C, **_shaped(table, n))
 
     def _quantity(self, name: str, lam: Any, w_f: Any, n: Any, outside: str) -> Any:
-        def plain(*cable: Any) -> Any:
-            check_outside(outside)
-            lam, w_f, n = cable
+        check_outside(outside)
+        if one := self._one((name,), lam, w_f, n):
+            return np.int8(one[name]) if name == "status" else np.float64(one[name])
+
+        def plain(*, lam: Any, w_f: Any, n: Any) -> Any:
             lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
             table = self.critical.answer((name,), outside, lam=lam.ravel(), w_f=w_f.ravel(), n=n.ravel())
             return table[name].reshape(n.shape)[()]
 
-        return _with_xarray(plain, SYMBOLS[name], lam, w_f, n)
+        kind = np.int8 if name == "status" else np.float64
+        return quantity_of(plain, name, SYMBOLS[name].long_name, kind, lam=lam, w_f=w_f, n=n)
+
+    def _one(self, names: tuple[str, ...], lam: Any, w_f: Any, n: Any) -> dict[str, float] | None:
+        """Quantities of one point that needs no check beyond its being in the table; None for all others."""
+        lam, w_f, n = one_number(lam), one_number(w_f), one_number(n)
+        if lam is None or w_f is None or n is None:
+            return None
+        return self.critical.one(names, lam=lam, w_f=w_f, n=n)
 
 
 def _shaped(table: dict[str, NDArray[Any]], like: NDArray[Any]) -> dict[str, NDArray[Any]]:
     return {name: column.reshape(like.shape) for name, column in table.items()}
-
-
-def _with_xarray(plain: Callable, symbol: Symbol, *arguments: Any) -> Any:
-    """Apply a function of arrays to arguments some of which may be xarray objects; then the result is one too."""
-    # Whoever passes an xarray object has imported xarray: no need to import it to find out.
-    xarray = sys.modules.get("xarray")
-    labelled = [value for value in arguments if hasattr(value, "dims")]
-    if xarray is None or not labelled:
-        return plain(*arguments)
-    if not all(isinstance(value, xarray.DataArray) for value in labelled):
-        raise ValueError("labelled arguments must be xarray DataArrays; take one variable out of a Dataset")
-    result = xarray.apply_ufunc(plain, *arguments)
-    result.name = symbol.name
-    result.attrs = {"long_name": symbol.long_name, "units": "1"}
-    return result

@@ -56,6 +56,9 @@ class DragFoldTable:
         """
         return "support" in file.groups and "drag" in file["support"].groups
 
+    def __repr__(self) -> str:
+        return f"{self.holds}: {', '.join(f'{name} {held}' for name, held in self.domain().items())}"
+
     def domain(self) -> dict[str, str]:
         """Ranges of what is held, in words.
 

@@ -67,6 +67,9 @@ class FishTable:
         """
         return method == EQUILIBRIA
 
+    def __repr__(self) -> str:
+        return f"{self.holds}: {', '.join(f'{name} {held}' for name, held in self.domain().items())}"
+
     def domain(self) -> dict[str, str]:
         """Ranges of what is held, in words.
 
