@@ -31,6 +31,7 @@ COMMANDS = (
     "sweep",
     "design",
     "device",
+    "map",
     "build",
     "plot",
     "report",
