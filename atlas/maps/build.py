@@ -89,8 +89,11 @@ def estimate(spec: Spec) -> Estimate:
             if not count:
                 continue
             began, looked, held = time.process_time(), 0, 0
-            for k in rng.integers(count, size=min(SAMPLED, count)):
-                columns = compute_tile(spec, first + int(k), only=NEIGHBOURS if first == 0 and states else 1)
+            some = NEIGHBOURS if first == 0 and states else 1
+            for k in rng.integers(count, size=SAMPLED):
+                most = len(tiles.indices(int(k))[0]) - some
+                begin = int(rng.integers(max(0, most) + 1))
+                columns = compute_tile(spec, first + int(k), slice(begin, begin + some))
                 looked += len(next(iter(columns.values())))
                 held += sum(column.nbytes for column in columns.values())
                 if time.process_time() - began > ENOUGH:

@@ -100,7 +100,7 @@ def warm(spec: Spec) -> None:
     states, folds = stages(spec)
     with limited_threads(1):
         for number in [0] * (states > 0) + [states] * (folds > 0):
-            compute_tile(spec, number, only=2)
+            compute_tile(spec, number, slice(2))
 
 
 def run_tiles(

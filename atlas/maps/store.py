@@ -146,6 +146,7 @@ def _attributes(spec: Spec, digests: list[str]) -> dict[str, Any]:
         "title": spec.title or "Map of towed cables",
         "institution": "towatlas",
         "source": "towatlas map",
+        "history": "towatlas map",
         "comment": COMMENT,
         "fields": " ".join(spec.fields),
         "branches": spec.branches,
@@ -187,7 +188,8 @@ def merge(folder: Path, spec: Spec, file: Path) -> None:
             )
             with netCDF4.Dataset(temporary, "a") as out:
                 for name, variable in variables(spec).items():
-                    _copy(out, whole[name].variable, name, fold_tiles(spec) if variable.folds else state_tiles(spec))
+                    tiles = fold_tiles(spec) if variable.folds else state_tiles(spec)
+                    _copy(out, whole[name].variable, name, tiles, variable.attributes)
         with temporary.open("rb+") as written:
             os.fsync(written.fileno())
         os.replace(temporary, file)
@@ -199,12 +201,12 @@ def merge(folder: Path, spec: Spec, file: Path) -> None:
             temporary.unlink()
 
 
-def _copy(out: Any, array: xr.Variable, name: str, tiles: Tiles) -> None:
-    """A variable into a NetCDF file, tile by tile."""
+def _copy(out: Any, array: xr.Variable, name: str, tiles: Tiles, attributes: dict[str, Any]) -> None:
+    """A variable into a NetCDF file, tile by tile, with attributes whose types Zarr does not keep."""
     for dim, size in zip(array.dims, array.shape, strict=True):
         if dim not in out.dimensions:
             out.createDimension(dim, size)
-    kind = array.dtype
+    kind = array.dtype.newbyteorder("=")
     beyond = array.shape[len(tiles.axes) :]
     copy = out.createVariable(
         name,
@@ -214,7 +216,7 @@ def _copy(out: Any, array: xr.Variable, name: str, tiles: Tiles) -> None:
         chunksizes=(*tiles.block, *beyond) if array.dims else None,
         **(COMPRESSION if array.dims else {}),
     )
-    copy.setncatts(array.attrs)
+    copy.setncatts(attributes)
     for number in range(len(tiles)):
         place = tiles.slices(number)
         copy[place] = array[place].values

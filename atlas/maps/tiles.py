@@ -35,7 +35,7 @@ HEADER = len(MARK) + 64 + 1
 SHELF = 1000
 
 
-def compute_tile(spec: Spec, number: int, only: int | None = None) -> Columns:
+def compute_tile(spec: Spec, number: int, part: slice = slice(None)) -> Columns:
     """The numbers of a tile; the same bits in any process on processors of one kind.
 
     Parameters
@@ -43,8 +43,8 @@ def compute_tile(spec: Spec, number: int, only: int | None = None) -> Columns:
     spec : Spec
     number : int
         From 0; shapes first, then folds.
-    only : int, optional
-        So many of its systems, from the first.
+    part : slice
+        Which of its systems; all by default.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def compute_tile(spec: Spec, number: int, only: int | None = None) -> Columns:
         axes, tiles, solve = spec.axes, state_tiles(spec), _states
     else:
         axes, tiles, solve = spec.cable_axes, fold_tiles(spec), _folds
-    at = tuple(k[:only] for k in tiles.indices(number if number < states else number - states))
+    at = tuple(k[part] for k in tiles.indices(number if number < states else number - states))
     with patience(inf, each=SECONDS):
         return _guarded(solve, spec, spec.numbers(axes, at))
 
