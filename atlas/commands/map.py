@@ -5,7 +5,19 @@ import os
 from pathlib import Path
 from typing import Any
 
-from towatlas.commands.common import FAILED, NO_STATE, OK, OUTSIDE, number, print_json, real, say
+from towatlas.commands.common import (
+    FAILED,
+    FIGURE_FORMATS,
+    NO_STATE,
+    OK,
+    OUTSIDE,
+    new_figure,
+    number,
+    print_json,
+    real,
+    save_figure,
+    say,
+)
 
 
 def add(commands: Any) -> None:
@@ -14,9 +26,11 @@ def add(commands: Any) -> None:
         "map",
         help="shapes, folds and growth rates of very many systems, on many processes",
         description="Compute a map from its spec, on all cores of this machine or on a dask cluster, and put it "
-        "together in DIR/map.zarr; or, with --at, look one up. docs/maps.md lists the keys of a spec.",
+        "together in DIR/map.zarr; or, with --at and --plot, look one up. docs/maps.md lists the keys of a spec.",
     )
-    parser.add_argument("what", metavar="SPEC", help="a TOML file or the name of a shipped spec; with --at a map")
+    parser.add_argument(
+        "what", metavar="SPEC", help="a TOML file or the name of a shipped spec; with --at or --plot a map"
+    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="the folder of the map")
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--workers", type=_processes, metavar="N", help="processes of this machine; default all cores")
@@ -25,7 +39,9 @@ def add(commands: Any) -> None:
     parser.add_argument("--dry-run", action="store_true", help="say what it would take, and stop")
     parser.add_argument("--merge", type=Path, metavar="FILE.nc", help="write it as one NetCDF file as well")
     parser.add_argument("--quiet", action="store_true", help="no progress, no estimate")
-    parser.add_argument("--at", type=_point, metavar="NAME=VALUE,...", help="look up one point: each axis of the map")
+    look = parser.add_mutually_exclusive_group()
+    look.add_argument("--at", type=_point, metavar="NAME=VALUE,...", help="look up one point: each axis of the map")
+    look.add_argument("--plot", type=Path, metavar="FILE", help="draw it: FILE.svg, .png or .pdf")
     parser.add_argument("--json", action="store_true", help="with --at: an object instead of a table")
     parser.set_defaults(run=_run)
 
@@ -46,6 +62,8 @@ def _point(text: str) -> dict[str, float]:
 def _run(options: argparse.Namespace) -> int:
     if options.at is not None:
         return _look(options)
+    if options.plot is not None:
+        return _draw(options)
     from towatlas.maps.build import begun, build_map, estimate, refuse
     from towatlas.maps.runner import MEMORY
     from towatlas.maps.spec import read_spec
@@ -102,6 +120,20 @@ def _look(options: argparse.Namespace) -> int:
         return OK
     say(OUTCOMES[worst])
     return NO_STATE if worst == FOLD else FAILED
+
+
+def _draw(options: argparse.Namespace) -> int:
+    if options.plot.suffix.lower() not in FIGURE_FORMATS:
+        raise ValueError(f"--plot {options.plot}: the ending must be one of {', '.join(FIGURE_FORMATS)}")
+    from towatlas.maps.lookup import open_map
+
+    known = open_map(options.what)
+    # A figure without a screen.
+    new_figure(1.0, 1.0)
+    from towatlas.plot.map import plot_map
+
+    save_figure(plot_map(known), options.plot)
+    return OK
 
 
 def _row(found: Any, k: int) -> dict[str, Any]:

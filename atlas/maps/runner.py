@@ -4,6 +4,7 @@ A task is a tile: it computes, writes its file, and returns what became of it. A
 program had not finished is missing from the folder, and is done again.
 """
 
+import logging
 import shutil
 import time
 from collections.abc import Iterator, Sequence
@@ -173,6 +174,8 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
     """A client of a cluster, or of processes of this machine, one thread each."""
     from distributed import Client, LocalCluster
 
+    # That a scheduler or a worker is gone is dealt with here.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with ExitStack() as stack:
         address: Any = scheduler
         try:
