@@ -31,7 +31,7 @@ def empty_tasks(count: int) -> tuple[float, float]:
     """Tasks a second, and CPU time of scheduler and client for each [s]."""
     from distributed import Client, LocalCluster, wait
 
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster) as client:
         wait([client.submit(nothing, -k, pure=False) for k in range(1, 20)])
         cpu, began = time.process_time(), time.perf_counter()
         running: set[Any] = set()

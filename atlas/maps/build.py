@@ -50,7 +50,7 @@ class Estimate:
     def __str__(self) -> str:
         each = 1e3 * self.seconds / self.systems
         return (
-            f"{self.systems:,} systems in {self.tiles:,} tiles: about {_time(self.seconds)} of CPU ({each:.2g} ms a "
+            f"{self.systems:,} systems in {self.tiles:,} tiles: about {_time(self.seconds)} of CPU ({each:.3g} ms a "
             f"system) and {_size(self.size)} on the disk"
         )
 

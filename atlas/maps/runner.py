@@ -185,7 +185,7 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
                         n_workers=workers,
                         threads_per_worker=1,
                         memory_limit=MEMORY,
-                        dashboard_address=None,
+                        dashboard_address=":0",
                         silence_logs=50,
                         env={"NUMBA_NUM_THREADS": "1"},
                     )

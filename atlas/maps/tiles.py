@@ -166,11 +166,12 @@ def _curves(spec: Spec, numbers: Numbers, count: NDArray[Any], width: int) -> Co
     return out
 
 
-def _curve(found: Equilibria, k: int, s: NDArray[np.float64]) -> Any:
+def _curve(found: Equilibria, k: int, s: NDArray[np.float64]) -> dict[str, Any]:
     try:
-        return shape_of(found, k, s)
+        curve = shape_of(found, k, s)
     except ArithmeticError:
         return dict.fromkeys(CURVES, np.nan)
+    return {name: curve[name].values for name in CURVES}
 
 
 def _system(numbers: Numbers, i: int) -> tuple[System, float]:
