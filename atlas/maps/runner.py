@@ -16,7 +16,6 @@ from typing import Any
 from tqdm import tqdm
 
 from towatlas.builders.file import limited_threads
-from towatlas.kernels import status
 from towatlas.maps.layout import stages
 from towatlas.maps.spec import Spec
 from towatlas.maps.tiles import compute_tile, tile_path, write_tile
@@ -29,7 +28,7 @@ AHEAD = 4
 TRIES = 4
 # How long a scheduler that is gone, or a cluster without workers, is waited for, s; how long workers of this machine
 # may take to come back before they are all started anew; and how often it is looked how many there are.
-GONE, BACK, LOOK = 120.0, 20.0, 2.0
+GONE, BACK, LOOK = 120.0, 60.0, 2.0
 # What compiling may take, s.
 COMPILED = 900.0
 # Room that is left on a disk, bytes: for the file systems' own needs, and the next tile of each worker.
@@ -48,18 +47,14 @@ class Done:
     ----------
     number : int
         Of the tile.
-    systems, failed : int
-        In it, and those with a status.
-    seconds : float
-        It took [s].
+    systems : int
+        In it.
     message : str
         Why there is none; empty where it is written.
     """
 
     number: int
     systems: int
-    failed: int
-    seconds: float
     message: str = ""
 
 
@@ -78,7 +73,6 @@ def do_tile(folder: str, spec: Spec, number: int) -> Done:
     -------
     Done
     """
-    began = time.perf_counter()
     try:
         if shutil.disk_usage(folder).free < SPARE:
             raise OSError("no room is left on the disk")
@@ -86,9 +80,8 @@ def do_tile(folder: str, spec: Spec, number: int) -> Done:
             columns = compute_tile(spec, number)
         write_tile(tile_path(Path(folder), number), columns)
     except OSError as error:
-        return Done(number, 0, 0, time.perf_counter() - began, f"tile {number} was not written: {error}")
-    codes = columns["status" if "status" in columns else "folds_status"]
-    return Done(number, len(codes), int((codes != status.OK).sum()), time.perf_counter() - began)
+        return Done(number, 0, f"tile {number} was not written: {error}")
+    return Done(number, len(next(iter(columns.values()))))
 
 
 def warm(spec: Spec) -> None:
