@@ -2,10 +2,12 @@
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from towatlas.kernels import status
 from towatlas.maps.layout import KINDS
@@ -55,7 +57,7 @@ def plot_map(known: Map) -> Figure:
     grid[0, 0].set_ylabel(_label(axes[-2]))
     names = ("one shape", "three shapes", "five", "more")
     most = int(known.dataset["count"].max())
-    handles = [
+    handles: list[Artist] = [
         Patch(facecolor=colour, edgecolor="0.6", label=name)
         for k, (colour, name) in enumerate(zip(SHADES, names, strict=True))
         if most >= 2 * k + 1
@@ -88,6 +90,10 @@ def _panel(ax: Axes, known: Map, first: int | None) -> None:
     for name, axis in zip(list(known.axes)[-2:], ("y", "x"), strict=True):
         if known.dataset[name].attrs["spacing"] == "log":
             ax.set(**{f"{axis}scale": "log"})
+            scale = ax.xaxis if axis == "x" else ax.yaxis
+            scale.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            scale.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            scale.set_minor_formatter(NullFormatter())
 
 
 def _symbol(name: str) -> str:
