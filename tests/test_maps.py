@@ -22,6 +22,7 @@ from towatlas.maps.lookup import COMPUTED, EDGE, FOLD, OUTSIDE, UNKNOWN
 from towatlas.maps.runner import do_tile
 from towatlas.maps.spec import NAMES, RATIOS, make_spec, read_spec, shipped_specs
 from towatlas.maps.tiles import compute_tile, read_tile, tile_path, write_tile
+from towatlas.plot.map import plot_map
 
 ROOT = Path(__file__).parent.parent
 DRAG = {
@@ -182,6 +183,10 @@ def test_the_expected_shape_alone(small, tmp_path):
         row = every.isel(C=i, lam=2, gamma=k)
         assert float(one.r_f.isel(C=i, lam=2, gamma=k)[0]) == float(row.r_f[alone.expected])
         assert int(row["count"]) == len(alone)
+    figure = plot_map(towatlas.open_map(folder))
+    assert [ax.get_title() for ax in figure.axes] == ["$C$ = 0", "$C$ = 0.05", "$C$ = 0.1"]
+    with pytest.raises(ValueError, match="whether the shape expected lasts: it needs"):
+        plot_map(towatlas.open_map(small))
 
 
 def test_a_system_that_fails_spoils_no_other(monkeypatch):

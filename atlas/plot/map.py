@@ -69,7 +69,7 @@ def plot_map(known: Map) -> Figure:
             handles.append(line)
     if (known.dataset.status != status.OK).any():
         handles.append(Patch(facecolor=FAILED, label="not computed"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(4, panels + 1), frameon=False)
     return figure
 
 
