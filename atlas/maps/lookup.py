@@ -261,7 +261,7 @@ def open_map(path: str | os.PathLike) -> Map:
     ...     failed = build_map(spec, pathlib.Path(folder) / "map")
     ...     found = open_map(pathlib.Path(folder) / "map").at(lam=5.1, gamma=1.1)
     >>> failed, int(found["count"][0]), found.nodes.values.tolist()
-    (0, 3, [[0, 1, 1]])
+    (0, 3, [[1, 1, 0]])
     """
     import xarray
 
