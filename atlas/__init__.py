@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from towatlas.effort import TooMuchWork, patience
     from towatlas.limits import excess_length, massless_cable, threshold_length
+    from towatlas.maps.lookup import Map, open_map
     from towatlas.results import CriticalStates, Cusps, DragFolds, Equilibria, FishPositions, Folds
     from towatlas.results_motion import Boundary, Branch, Diagram, Flutter, Stability, Window
     from towatlas.scene.designs import design
@@ -49,6 +50,7 @@ __all__ = [
     "FishPositions",
     "Flutter",
     "Folds",
+    "Map",
     "Stability",
     "System",
     "TooMuchWork",
@@ -67,6 +69,7 @@ __all__ = [
     "krein_boundaries",
     "massless_cable",
     "open_atlas",
+    "open_map",
     "patience",
     "read_scene",
     "shape",
@@ -84,6 +87,7 @@ __all__ = [
 _HOMES = {
     "effort": ("TooMuchWork", "patience"),
     "limits": ("excess_length", "massless_cable", "threshold_length"),
+    "maps.lookup": ("Map", "open_map"),
     "results": ("CriticalStates", "Cusps", "DragFolds", "Equilibria", "FishPositions", "Folds"),
     "results_motion": ("Boundary", "Branch", "Diagram", "Flutter", "Stability", "Window"),
     "scene.designs": ("design",),

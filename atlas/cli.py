@@ -32,6 +32,7 @@ COMMANDS = (
     "sweep",
     "design",
     "device",
+    "map",
     "build",
     "plot",
     "explore",

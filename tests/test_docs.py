@@ -16,7 +16,16 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").g
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "page", ["README.md", "docs/equilibria.md", "docs/drag.md", "docs/scenes.md", "docs/device.md", "docs/certify.md"]
+    "page",
+    [
+        "README.md",
+        "docs/equilibria.md",
+        "docs/drag.md",
+        "docs/scenes.md",
+        "docs/device.md",
+        "docs/certify.md",
+        "docs/maps.md",
+    ],
 )
 def test_python_of_a_page_runs(page, atlas_path, equilibria_path, tmp_path):
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.S)

@@ -72,3 +72,13 @@ def test_a_missing_zero_is_counted():
         counts = [int(count_zeros(Motions([body]), [zeros], line)[0]) for zeros in (known, none)]
         assert counts[0] == counts[1]
         assert counts[0] >= (2 if fluid else 4)
+
+
+def test_shapes_damped_faster_than_the_reach():
+    """Each by itself, where no line within the reach has the leading zero on its right."""
+    gamma = np.linspace(0.2, 2.0, 100)[8:16]
+    found = towatlas.stability_many(5.0, 1.0, gamma, C=1000.0, w=0.5, m_f=1.5)
+    assert (found.kind.values == "stable").all()
+    assert (found.growth_status.values == status.OK).all()
+    alone = towatlas.stability(5.0, 1.0, gamma[0], C=1000.0, w=0.5, m_f=1.5)
+    assert alone.kind.tolist() == ["stable"]

@@ -180,7 +180,13 @@ class _Followed:
         if not len(self.which):
             return found
         zeros = self._follow()
-        kept = np.array([_distinct(part.sigma) for part in zeros])
+        # Where everything is damped faster than the reach, there is no line within it to count right of.
+        kept = np.array(
+            [
+                _distinct(part.sigma) and (not self.drag or _line(part.sigma) > -self.bodies[k].reach)
+                for k, part in zip(self.which, zeros, strict=True)
+            ]
+        )
         self.which, zeros = self.which[kept], [part for part, well in zip(zeros, kept, strict=True) if well]
         if not zeros:
             return found

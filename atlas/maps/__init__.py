@@ -1,0 +1,1 @@
+"""Maps: shapes, folds and growth rates of very many cables, computed on many processes, stored, looked up."""
