@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from towatlas.effort import TooMuchWork, patience
     from towatlas.limits import excess_length, massless_cable, threshold_length
-    from towatlas.results import CriticalStates, Cusps, DragFolds, Equilibria, FishPositions, Folds
+    from towatlas.results import (
+        CriticalStates,
+        Cusps,
+        DragFolds,
+        Equilibria,
+        FishPositions,
+        FlutterSpeeds,
+        Folds,
+        GrowthRates,
+    )
     from towatlas.results_motion import Boundary, Branch, Diagram, Flutter, Stability, Window
     from towatlas.scene.designs import design
     from towatlas.scene.file import read_scene
@@ -48,7 +57,9 @@ __all__ = [
     "Equilibria",
     "FishPositions",
     "Flutter",
+    "FlutterSpeeds",
     "Folds",
+    "GrowthRates",
     "Stability",
     "System",
     "TooMuchWork",
@@ -84,7 +95,16 @@ __all__ = [
 _HOMES = {
     "effort": ("TooMuchWork", "patience"),
     "limits": ("excess_length", "massless_cable", "threshold_length"),
-    "results": ("CriticalStates", "Cusps", "DragFolds", "Equilibria", "FishPositions", "Folds"),
+    "results": (
+        "CriticalStates",
+        "Cusps",
+        "DragFolds",
+        "Equilibria",
+        "FishPositions",
+        "FlutterSpeeds",
+        "Folds",
+        "GrowthRates",
+    ),
     "results_motion": ("Boundary", "Branch", "Diagram", "Flutter", "Stability", "Window"),
     "scene.designs": ("design",),
     "scene.file": ("read_scene",),
