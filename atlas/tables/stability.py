@@ -488,12 +488,13 @@ class StabilityTable:
         speed, frequency = (self.arrays[f"sheet_{name}"][mine] for name in ("speed", "frequency"))
         j, i = (int(cell_of(np.array([at]), count)[0]) for at, count in zip((y, x), speed.shape[1:], strict=True))
         error = self.arrays["sheet_error"][mine][:, j, i]
-        corners = np.isfinite(speed[:, j : j + 2, i : i + 2]).sum(axis=(1, 2))
-        held = np.isfinite(error)
-        whole = held[corners > 0].all() and self.complete[n - 1, j : j + 2, i : i + 2].all()
+        held, fastest = np.isfinite(error), np.log(self.axes.speed_max)
+        # Sheets go on beyond the highest speed.
+        near = (speed[:, j : j + 2, i : i + 2] <= fastest).any(axis=(1, 2))
+        whole = held[near].all() and self.complete[n - 1, j : j + 2, i : i + 2].all()
         ratio = sheet_at(speed[held], y, x)
         order = np.argsort(ratio)
-        order = order[ratio[order] <= np.log(self.axes.speed_max)]
+        order = order[ratio[order] <= fastest]
         gamma = fold * np.exp(ratio[order])
         return {
             "gamma": gamma,
