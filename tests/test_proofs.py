@@ -142,7 +142,7 @@ def test_no_shot_violates_it_and_one_violates_more(statement, searched):
 @pytest.mark.parametrize("statement", STATEMENTS)
 def test_longer_attack(statement):
     k = list(STATEMENTS).index(statement)
-    found = differential_evolution(lambda x: margins(x)[k, 0], BOUNDS, maxiter=12, popsize=12, rng=1, **BATCHES)
+    found = differential_evolution(lambda x: margins(x)[k, 0], BOUNDS, maxiter=12, popsize=12, seed=1, **BATCHES)
     assert found.fun > 0.0
 
 
@@ -216,7 +216,7 @@ def test_extrema_fall_with_their_number():
         ratio = m[:, :-1] / m[:, 1:]
         return np.where(np.isnan(ratio), np.inf, ratio).min(axis=1)
 
-    found = differential_evolution(margin, ((-3, 4), (1, 5)), maxiter=8, popsize=8, rng=2, **BATCHES)
+    found = differential_evolution(margin, ((-3, 4), (1, 5)), maxiter=8, popsize=8, seed=2, **BATCHES)
     assert 1.0 < found.fun < 1.6
 
 
