@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 ATLAS := build/atlas.nc
 
 .DEFAULT_GOAL := help
-.PHONY: help install atlas seeds equilibria drag test bench failures types check figures clean
+.PHONY: help install atlas seeds equilibria drag stability test bench failures types check figures clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
@@ -31,6 +31,9 @@ equilibria: install  ## build build/equilibria.nc, the table of fish positions
 
 drag: install  ## build build/atlas.nc with the folds with drag in it; some minutes
 	$(BIN)/python -m towatlas build --drag --out $(ATLAS)
+
+stability: install  ## build build/stability.nc, an atlas with growth rates in it; some minutes
+	$(BIN)/python -m towatlas build --stability --out build/stability.nc
 
 test: install  ## run the tests, on two cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile

@@ -10,7 +10,16 @@ if TYPE_CHECKING:
     from towatlas.effort import TooMuchWork, patience
     from towatlas.limits import excess_length, massless_cable, threshold_length
     from towatlas.maps.lookup import Map, open_map
-    from towatlas.results import CriticalStates, Cusps, DragFolds, Equilibria, FishPositions, Folds
+    from towatlas.results import (
+        CriticalStates,
+        Cusps,
+        DragFolds,
+        Equilibria,
+        FishPositions,
+        FlutterSpeeds,
+        Folds,
+        GrowthRates,
+    )
     from towatlas.results_motion import Boundary, Branch, Diagram, Flutter, Stability, Window
     from towatlas.scene.designs import design
     from towatlas.scene.file import read_scene
@@ -49,7 +58,9 @@ __all__ = [
     "Equilibria",
     "FishPositions",
     "Flutter",
+    "FlutterSpeeds",
     "Folds",
+    "GrowthRates",
     "Map",
     "Stability",
     "System",
@@ -88,7 +99,16 @@ _HOMES = {
     "effort": ("TooMuchWork", "patience"),
     "limits": ("excess_length", "massless_cable", "threshold_length"),
     "maps.lookup": ("Map", "open_map"),
-    "results": ("CriticalStates", "Cusps", "DragFolds", "Equilibria", "FishPositions", "Folds"),
+    "results": (
+        "CriticalStates",
+        "Cusps",
+        "DragFolds",
+        "Equilibria",
+        "FishPositions",
+        "FlutterSpeeds",
+        "Folds",
+        "GrowthRates",
+    ),
     "results_motion": ("Boundary", "Branch", "Diagram", "Flutter", "Stability", "Window"),
     "scene.designs": ("design",),
     "scene.file": ("read_scene",),

@@ -375,3 +375,70 @@ class DragFolds(Answer):
         """The status of one fold in words: of `appears`, `ends`, `again` or of the `cusp`."""
         column = self.status if of == "appears" else getattr(self, f"status_{of}")
         return codes.SENTENCES[int(column[index])]
+
+
+@dataclass(frozen=True)
+class GrowthRates:
+    """Growth rates of inner shapes in a vacuum, from an atlas; arrays of one shape, that of what was asked.
+
+    Attributes
+    ----------
+    lam, w_f, gamma : ndarray, shape (...)
+        Length over tow radius, fish weight over (mu + rho A) g R, speed Omega sqrt(R/g) [-].
+    n : ndarray of int, shape (...)
+        Nodes of the shape, 0 for that of a cable slower than its first critical speed.
+    growth, frequency : ndarray, shape (...)
+        Of the leading eigenvalue over sqrt(g/R) [-]; of a shape that lasts 0 and that of its slowest mode. nan where
+        status is not OK, the frequency where n is 0.
+    unstable : ndarray of int, shape (...)
+        How many eigenvalues grow, conjugate ones counted each; -1 where status is not OK.
+    kind : ndarray of str, shape (...)
+        As of `Stability`.
+    error : ndarray, shape (...)
+        Estimated absolute error of growth and frequency over sqrt(g/R) [-].
+    status : ndarray of int8, shape (...)
+        Codes of `towatlas.kernels.status`.
+    """
+
+    lam: Array
+    w_f: Array
+    gamma: Array
+    n: Integers
+    growth: Array
+    frequency: Array
+    unstable: Integers
+    kind: NDArray[np.str_]
+    error: Array
+    status: NDArray[np.int8]
+
+
+@dataclass(frozen=True)
+class FlutterSpeeds:
+    """Speeds at which the inner shape of n nodes of one cable begins and ceases to flutter, from an atlas.
+
+    Attributes
+    ----------
+    lam, w_f : float
+        Length over tow radius, fish weight over (mu + rho A) g R [-].
+    n : int
+        Nodes of the shape, >= 1.
+    gamma : ndarray, shape (boundaries,)
+        Speeds Omega sqrt(R/g) [-], rising.
+    begins : ndarray of bool, shape (boundaries,)
+        Whether a mode begins to grow there as the speed rises, or ceases. Of n > 1 several may grow.
+    frequency : ndarray, shape (boundaries,)
+        Over sqrt(g/R) [-].
+    error : ndarray, shape (boundaries,)
+        Estimated relative error of gamma [-].
+    status : int
+        A code of `towatlas.kernels.status`; NOT_COUNTED where there may be others, as next to where a window opens.
+    """
+
+    lam: float
+    w_f: float
+    n: int
+    gamma: Array
+    begins: NDArray[np.bool_]
+    frequency: Array
+    error: Array
+    status: int

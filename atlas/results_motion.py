@@ -177,6 +177,9 @@ class Boundary(Answer):
         Which of the points are turning points: where two edges meet, in a cusp where three oscillations are one.
     error : ndarray, shape (points,)
         Estimated relative error of gamma, across the curve [-].
+    begins : ndarray of bool, shape (points,)
+        Whether a mode begins to grow there as the speed rises, or ceases; at a turning point neither. Where two edges
+        cross, a window closes and opens again: there two modes do not feel each other.
     kinds : (str, str)
         What is at its ends: "length" or "speed", the limits of what was looked at, "fold" of the statics, "real",
         where growth rates meet on the real axis instead, or "unknown".
@@ -190,6 +193,7 @@ class Boundary(Answer):
     r_f: Array
     turns: Integers
     error: Array
+    begins: NDArray[np.bool_]
     kinds: tuple[str, str]
 
     def columns(self) -> dict[str, Any]:

@@ -5,6 +5,7 @@ import pytest
 
 import towatlas
 from towatlas.limits import unchecked_threshold_length
+from towatlas.solve.krein import SPEED, Collisions, Domain, begins
 
 
 @pytest.fixture(scope="module")
@@ -85,6 +86,28 @@ def test_two_edges_meet_in_a_cusp():
         found = towatlas.stability(lam, 1.0, gamma + share * apart)
         kinds.append(str(found.kind[list(found.equilibria.branch).index("1 inner")]))
     assert kinds == ["flutter", "stable"]
+
+
+@pytest.mark.slow
+def test_windows_of_the_shape_with_two_nodes():
+    """Where flutter of the report's cable ceases, begins and ceases, known to 13 digits, lies on its curves."""
+    curves = towatlas.krein_boundaries(1352.0, 2)
+    assert len(curves) > 8
+    assert all("unknown" not in curve.kinds and curve.error.max() < 1e-8 for curve in curves)
+    start = []
+    for curve in curves:
+        away = np.log(curve.lam / 37.8)
+        excess = np.full(len(away), np.log(37.8 - float(unchecked_threshold_length(1352.0, 2))))
+        z = np.stack([np.log(curve.r_f * curve.gamma**2), np.log(curve.gamma), excess, curve.omega**2], axis=1)
+        for k in np.flatnonzero((away[:-1] < 0.0) != (away[1:] < 0.0)):
+            start.append(z[k] + away[k] / (away[k] - away[k + 1]) * (z[k + 1] - z[k]))
+    rows = np.arange(len(start))
+    collisions = Collisions(np.full(len(rows), 2), np.full(len(rows), 1352.0), Domain())
+    found, good = collisions.solve(np.stack(start), rows, -1)
+    begun = begins(collisions(found[good], rows[good])[1])
+    gammas = np.exp(found[good, SPEED])
+    for gamma, begin in ((3.643306226987, False), (3.887892146622, True), (4.635754473627, False)):
+        assert np.abs(gammas / gamma - 1.0)[begun == begin].min() < 1e-10
 
 
 def test_bad_numbers():

@@ -41,6 +41,7 @@ def build_atlas(
     progress: bool = True,
     extra: Mapping[str, xr.Dataset] | None = None,
     more_facts: Facts = (),
+    options: str = "",
 ) -> Summary:
     """Build an atlas file and move it into place.
 
@@ -62,6 +63,8 @@ def build_atlas(
         Further groups, by name.
     more_facts : tuple of (str, str)
         What there is to say of those.
+    options : str
+        Of `towatlas build`, where there are further groups.
 
     Returns
     -------
@@ -91,8 +94,7 @@ def build_atlas(
         else:
             root, facts = scan_table(scan, bar)
         bar.set_description("writing")
-        options = "--drag" if extra else f"--method {method}"
-        root.attrs = root_attributes(method, provenance(options) | root.attrs)
+        root.attrs = root_attributes(method, provenance(options or f"--method {method}") | root.attrs)
         write_atlas(path, root, groups)
     return Summary(path, f"method {method}", (*facts, *more_facts), time.perf_counter() - start)
 

@@ -157,6 +157,7 @@ def build_drag(
         progress=progress,
         extra={DRAG_GROUP: group},
         more_facts=(("drag", said),),
+        options="--drag",
     )
     return replace(summary, seconds=time.perf_counter() - begin)
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.tables.drag_series import DragAxes
+from towatlas.tables.stability import StabilityAxes
 
 Array = NDArray[np.float64]
 
@@ -197,3 +198,36 @@ class DragGrid:
     def size(self) -> int:
         """Number of cables to solve."""
         return self.n_max * (sum(w_f * lam for w_f, lam in self.stages) + self.checks)
+
+
+@dataclass(frozen=True)
+class StabilityGrid:
+    """Where growth rates and boundaries of flutter are tabulated. The defaults take some minutes.
+
+    Attributes
+    ----------
+    n_max : int
+        Highest pair, >= 1.
+    axes : StabilityAxes
+        The domain.
+    w_f, excess, speed : int
+        Nodes on each axis, >= 4.
+    curves_every : int
+        Whole curves are followed at every so many of the weights, the first among them; >= 1.
+    checks : int
+        Random points of each n, solved directly, against which the whole is checked.
+    """
+
+    n_max: int = 3
+    axes: StabilityAxes = field(default_factory=lambda: StabilityAxes(1e-2, 1e2, 1e4, 1.005, 3.0))
+    w_f: int = 16
+    excess: int = 13
+    speed: int = 25
+    curves_every: int = 3
+    checks: int = 100
+
+    @property
+    def size(self) -> int:
+        """Number of shapes to solve: nodes, middles of cells, checks."""
+        nodes, middles = (np.prod([count - less for count in (self.w_f, self.excess, self.speed)]) for less in (0, 1))
+        return self.n_max * int(nodes + middles + self.checks)

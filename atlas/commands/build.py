@@ -28,6 +28,12 @@ def add(commands: Any) -> None:
         help="put folds with drag into the atlas too: where pairs of equilibria appear and end; takes some minutes",
     )
     parser.add_argument(
+        "--stability",
+        action="store_true",
+        help="put growth rates of the inner shapes and boundaries of flutter in a vacuum into the atlas too; takes "
+        "some minutes",
+    )
+    parser.add_argument(
         "--method",
         choices=("fold", "scan"),
         help="fold (the default): direct solution, with a scan beside it as a witness; scan: the report's own method, "
@@ -41,17 +47,24 @@ def add(commands: Any) -> None:
 def _run(options: argparse.Namespace) -> int:
     how = {"threads": options.threads, "progress": not options.quiet}
     if options.equilibria:
-        if options.drag:
-            raise ValueError("--drag and --equilibria make two files: build one after the other")
+        if options.drag or options.stability:
+            raise ValueError("--drag, --stability and --equilibria make a file each: build one after the other")
         if options.method:
             raise ValueError("--method says how critical speeds are found; a table of --equilibria has one method")
         from towatlas.builders.fish import build_equilibria
 
         print(build_equilibria(options.out or EQUILIBRIA_PATH, **how))
         return OK
-    if options.drag:
+    if options.drag or options.stability:
+        if options.drag and options.stability:
+            raise ValueError("--drag and --stability make a file each: build one after the other, with --out")
         if options.method == "scan":
-            raise ValueError("--drag belongs in an atlas of method fold")
+            raise ValueError("--drag and --stability belong in an atlas of method fold")
+        if options.stability:
+            from towatlas.builders.stability import build_stability
+
+            print(build_stability(options.out or default_path(), **how))
+            return OK
         from towatlas.builders.drag_folds import build_drag
 
         print(build_drag(options.out or default_path(), **how))

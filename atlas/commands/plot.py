@@ -11,6 +11,7 @@ FIGURES = {
     "critical": "critical speeds against cable length, from an atlas",
     "drag": "how drag closes the jumps, solved",
     "stability": "where the shape with one node appears and flutters in a vacuum, solved; takes a minute",
+    "flutter": "where shapes of one, two and three nodes begin and cease to flutter, from an atlas with growth rates",
     "device": "the tightest turns of lateral force devices, solved",
 }
 ELSEWHERE = {
@@ -69,6 +70,14 @@ def _run(options: argparse.Namespace) -> int:
         save_figure(figure, options.out)
         return OK
     atlas = open_atlas(options.atlas)
+    if options.figure == "flutter":
+        figure, axes = new_figure(7.2, 6.4)
+        figure.clear()
+        from towatlas.plot.boundaries import plot_held
+
+        plot_held(atlas, figure.subplots(atlas.stability.n_max, 4, sharex=True, sharey=True, squeeze=False))
+        save_figure(figure, options.out)
+        return OK
     figure, axes = new_figure(7.2, 4.8)
     from towatlas.plot.critical import plot_critical
 

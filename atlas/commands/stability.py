@@ -1,11 +1,24 @@
 """`towatlas stability`: which shapes of one cable at one speed last, and how fast the others are left."""
 
 import argparse
+from pathlib import Path
 from typing import Any
 
-from towatlas.commands.common import FAILED, OK, add_cable, add_fluid, add_patience, fluid, print_json, real, say
+from towatlas.commands.common import (
+    FAILED,
+    OK,
+    OUTSIDE,
+    add_cable,
+    add_fluid,
+    add_patience,
+    fluid,
+    print_json,
+    real,
+    say,
+)
 from towatlas.kernels import status
 from towatlas.results_motion import Stability
+from towatlas.tables.atlas import open_atlas
 
 
 def add(commands: Any) -> None:
@@ -19,12 +32,20 @@ def add(commands: Any) -> None:
     )
     add_cable(parser, any_medium=True)
     add_fluid(parser)
+    parser.add_argument(
+        "--atlas",
+        type=Path,
+        metavar="FILE",
+        help="look the median shape in a vacuum up in a file made by `towatlas build --stability` instead",
+    )
     parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
     add_patience(parser)
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
+    if options.atlas is not None:
+        return _look_up(options)
     from towatlas.solve.stability import stability
 
     found = stability(options.lam, options.wf, options.gamma, **fluid(options))
@@ -38,6 +59,38 @@ def _run(options: argparse.Namespace) -> int:
             say(f"{found.equilibria.branch[k]}: {found.sentence(k)}")
     say(f"looked at: {found.looked_at}")
     return OK if (found.status == status.OK).any() else FAILED
+
+
+def _look_up(options: argparse.Namespace) -> int:
+    """The median shape, from an atlas."""
+    if fluid(options):
+        raise ValueError("--atlas holds growth rates in a vacuum: leave the fluid out, or leave --atlas out to compute")
+    atlas = open_atlas(options.atlas)
+    cable = options.lam, options.wf, abs(options.gamma)
+    found = atlas.growth(*cable, outside="nan")
+    if found.status != status.OK:
+        try:
+            atlas.growth(*cable)
+        except ValueError as error:
+            say(str(error).split("; outside=")[0] + "; without --atlas it is computed")
+        return OUTSIDE
+    n = int(found.n)
+    row = {
+        "branch": f"{n} inner" if n else "outward",
+        "R_x0": None,
+        "r_f": None,
+        "nodes": n,
+        "growth": real(found.growth),
+        "frequency": real(found.frequency),
+        "unstable": int(found.unstable),
+        "index": 2 * n,
+        "kind": str(found.kind),
+        "error": real(found.error),
+        "status": status.FLAG_MEANINGS.split()[int(found.status)],
+    }
+    print_json([row]) if options.json else _print_table([row])
+    say("looked up: the median shape, in a vacuum")
+    return OK
 
 
 def _row(found: Stability, k: int) -> dict[str, Any]:
@@ -63,12 +116,18 @@ def _print_table(rows: list[dict[str, Any]]) -> None:
         f"{'unstable':>8} {'index':>5}  kind"
     )
     for row in rows:
-        growth, frequency, error = (
+        growth, frequency, error, r_x0, r_f = (
             "-" if row[name] is None else format(row[name], style)
-            for name, style in (("growth", ".11g"), ("frequency", ".11g"), ("error", ".1e"))
+            for name, style in (
+                ("growth", ".11g"),
+                ("frequency", ".11g"),
+                ("error", ".1e"),
+                ("R_x0", ".13g"),
+                ("r_f", ".10g"),
+            )
         )
         unstable, index = ("-" if row[name] is None else row[name] for name in ("unstable", "index"))
         print(
-            f"{row['branch']:>8} {row['R_x0']:>20.13g} {row['r_f']:>16.10g} {row['nodes']:>5} {growth:>18} "
+            f"{row['branch']:>8} {r_x0:>20} {r_f:>16} {row['nodes']:>5} {growth:>18} "
             f"{frequency:>16} {error:>8} {unstable:>8} {index:>5}  {row['kind']}"
         )

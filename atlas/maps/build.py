@@ -15,7 +15,7 @@ import numpy as np
 
 from towatlas.builders.file import limited_threads, progress_bar
 from towatlas.kernels import status
-from towatlas.kernels.compiling import source_hash
+from towatlas.kernels.native import source_hash
 from towatlas.maps.layout import fold_tiles, stages, state_tiles
 from towatlas.maps.runner import run_tiles, warm
 from towatlas.maps.spec import MOST_SYSTEMS, Spec

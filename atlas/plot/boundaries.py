@@ -1,6 +1,7 @@
-"""The figure of where the shape with one node lasts in a vacuum: speed against cable length, by fish weights."""
+"""Figures of where inner shapes last in a vacuum: speed against cable length, by fish weights."""
 
 from itertools import pairwise
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -19,6 +20,7 @@ from towatlas.solve.krein import Domain
 from towatlas.solve.members import shoot_lanes, solve_members
 from towatlas.solve.spectra import growth_columns
 from towatlas.system import nondense_rows
+from towatlas.tables.atlas import Atlas
 
 Array = NDArray[np.float64]
 FOLD, EDGE, FLUTTERS = "#000000", "#D55E00", "#F6D9B8"
@@ -69,6 +71,43 @@ def plot_boundaries(w_f: tuple[float, ...] = (0.0, 1.0, 10.0, 1352.0), axes: lis
         Line2D([], [], color=FLUTTERS, linewidth=7, label="does not last"),
     ]
     axes[0].figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)  # type: ignore[union-attr]
+    return lines
+
+
+def plot_held(atlas: Atlas, axes: NDArray[Any]) -> list[Line2D]:
+    """Boundaries of flutter of an atlas over the length, the speed over that of the fold, a row each n.
+
+    Parameters
+    ----------
+    atlas : Atlas
+        With growth rates.
+    axes : ndarray of Axes, shape (n, weights)
+        Of so many weights that have curves, spread evenly among these.
+
+    Returns
+    -------
+    list of Line2D
+    """
+    table = atlas.stability
+    weights = sorted({curve.w_f for curve in table.curves})
+    shown = [weights[k] for k in np.linspace(0, len(weights) - 1, axes.shape[1]).round().astype(int)]
+    lines: list[Line2D] = []
+    for row, n in zip(axes, range(1, table.n_max + 1), strict=False):
+        for ax, w_f in zip(row, shown, strict=True):
+            threshold = float(unchecked_threshold_length(w_f, n))
+            for curve in table.curves:
+                if (curve.n, curve.w_f) == (n, w_f):
+                    ratio = curve.gamma / atlas.critical_speed(curve.lam, w_f, n, outside="solve")
+                    lines += ax.plot(curve.lam - threshold, ratio, color=EDGE, linewidth=0.9)
+            ax.axhline(1.0, color=FOLD, linewidth=1.5)
+            limits = (table.axes.excess_min, table.axes.excess_max)
+            ax.set(xscale="log", xlim=limits, ylim=(0.97, table.axes.speed_max))
+            ax.grid(which="major", color="0.92", linewidth=0.5)
+            if n == 1:
+                ax.set_title(f"{SYMBOLS['w_f'].tex} = {w_f:.3g}", fontsize=9)
+            if n == table.n_max:
+                ax.set_xlabel(r"$\lambda - \lambda_{cn}$")
+        row[0].set_ylabel(rf"$\gamma / \gamma_{{c{n}}}$")
     return lines
 
 

@@ -8,7 +8,7 @@ from towatlas.kernels import status
 from towatlas.limits import unchecked_threshold_length
 from towatlas.results_motion import Boundary
 from towatlas.solve.critical import solve_rows
-from towatlas.solve.krein import SPEED, Collisions, Domain, boundaries
+from towatlas.solve.krein import SPEED, Collisions, Domain, S, boundaries
 from towatlas.solve.members import shoot_lanes, solve_members
 from towatlas.solve.motion import Array
 from towatlas.solve.spectra import growth_columns
@@ -62,7 +62,8 @@ def krein_boundaries(w_f: float, n: int = 1) -> tuple[Boundary, ...]:
             return ()
         orders, weights = np.full(rows, n), np.full(rows, w_f)
         found, good = Collisions(orders, weights, domain).solve(start, np.arange(rows), -1)
-        good &= np.abs(found - start)[:, SPEED] < NEAR
+        # With s below zero two real growth rates meet.
+        good &= (np.abs(found - start)[:, SPEED] < NEAR) & (found[:, S] >= 0.0)
         return tuple(boundaries(found[good], orders[good], weights[good], domain))
 
 

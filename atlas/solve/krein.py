@@ -5,11 +5,13 @@ D and its derivative in s are zero. Unknowns are the offset of the fish, the spe
 the limits of length and speed, at a fold of the statics, or at s = 0, beyond which growth rates are real.
 """
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from towatlas.effort import check_patience
 from towatlas.kernels import status
 from towatlas.limits import unchecked_threshold_length
 from towatlas.numerics.curves import Curve, Steps, follow, tangents
@@ -27,7 +29,10 @@ UNKNOWNS = 4
 # Differences of the unknowns for slopes; circle of D around s, and points of its upper half.
 DIFFERENCE, RADIUS, HALF = 1e-5, 0.15, 9
 STEPS = Steps(first=0.01, longest=0.25, shortest=1e-6, near=1e-6, bent=0.3, easy=3, corrections=8, points=400)
-ROUNDS, LONGEST, SETTLED = 20, 0.2, 1e-11
+ROUNDS, LONGEST, SETTLED, NOISE = 20, 0.2, 1e-11, 1e-8
+# Solved for side by side: the series of their shapes are held in memory.
+TOGETHER = 64
+REMEDY = "a smaller n has fewer of them"
 SLOPE = jets_of(1)
 
 
@@ -50,8 +55,8 @@ class Domain:
 class Collisions:
     """Equations of Krein collisions, of rows of n and w_f."""
 
-    def __init__(self, n: Integers, w_f: Array, domain: Domain):
-        self.n, self.w_f, self.domain = n, w_f, domain
+    def __init__(self, n: Integers, w_f: Array, domain: Domain, pool: Executor | None = None):
+        self.n, self.w_f, self.domain, self.pool = n, w_f, domain, pool
         self.threshold = unchecked_threshold_length(w_f, n)
 
     def systems(self, z: Array, rows: Integers) -> Array:
@@ -59,34 +64,38 @@ class Collisions:
         lam = self.threshold[rows] + np.exp(z[:, EXCESS])
         return nondense_rows(lam=lam, w_f=self.w_f[rows], C=np.zeros(len(rows)))
 
-    def values(self, z: Array, rows: Integers) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """How far points are from being collisions, shape (points, 3), slopes of the radius of the tow point along
-        shots, and whether they are sound."""
+    def values(self, z: Array, rows: Integers) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+        """How far points are from being collisions, shape (points, 3), the slope of that in s, slopes of the radius of
+        the tow point along shots, and whether they are sound."""
         gamma, systems = np.exp(z[:, SPEED]), self.systems(z, rows)
         r = np.exp(z[:, X])
         ends = shoot(r, gamma, systems, SLOPE)
         miss = np.log(np.hypot(ends.X[:, 0], ends.Y[:, 0])) - 2.0 * z[:, SPEED]
         reach = 1.0 + np.sqrt(np.abs(z[:, S]) + RADIUS)
-        bodies = motions(r / gamma**2, gamma, systems, reach)
+        bodies = motions(r / gamma**2, gamma, systems, reach, pool=self.pool)
         sound = (ends.status == status.OK) & np.array([body.status == status.OK for body in bodies])
         turn = np.exp(1j * np.pi * np.arange(HALF) / (HALF - 1))
         points = z[:, S, None] + RADIUS * turn
         owner = np.repeat(np.arange(len(z)), HALF)
-        values, logs = Motions(bodies).evans(owner, 1j * np.sqrt(points.astype(complex)).ravel())
+        values, logs = Motions(bodies, self.pool).evans(owner, 1j * np.sqrt(points.astype(complex)).ravel())
         values, logs = values.reshape(points.shape), logs.reshape(points.shape)
         values = values * np.exp(logs - logs.max(axis=1)[:, None])
         circle = np.concatenate([values, values[:, -2:0:-1].conj()], axis=1)
         series = np.fft.fft(circle, axis=1).real / circle.shape[1]
         size = np.sqrt(np.square(series[:, :HALF]).sum(axis=1))
-        return np.stack([miss, series[:, 0] / size, series[:, 1] / size], axis=1), ends.log_rho[:, 1], sound
+        terms = series[:, :3] / size[:, None]
+        slope = np.stack([np.zeros(len(z)), terms[:, 1] / RADIUS, 2.0 * terms[:, 2] / RADIUS], axis=1)
+        return np.stack([miss, terms[:, 0], terms[:, 1]], axis=1), slope, ends.log_rho[:, 1], sound
 
     def __call__(self, z: Array, rows: Integers) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
         """As `towatlas.numerics.curves.Equations`."""
-        steps = np.concatenate([np.zeros((1, UNKNOWNS)), DIFFERENCE * np.eye(UNKNOWNS), -DIFFERENCE * np.eye(UNKNOWNS)])
+        aside = DIFFERENCE * np.eye(UNKNOWNS)[:S]
+        steps = np.concatenate([np.zeros((1, UNKNOWNS)), aside, -aside])
         every = (z[:, None] + steps).reshape(-1, UNKNOWNS)
-        values, slope, sound = self.values(every, np.repeat(rows, len(steps)))
-        values = values.reshape(len(z), len(steps), 3)
-        jacobian = (values[:, 1 : UNKNOWNS + 1] - values[:, UNKNOWNS + 1 :]) / (2.0 * DIFFERENCE)
+        values, by_s, slope, sound = self.values(every, np.repeat(rows, len(steps)))
+        values, by_s = (part.reshape(len(z), len(steps), 3) for part in (values, by_s))
+        by_others = (values[:, 1 : S + 1] - values[:, S + 1 :]) / (2.0 * DIFFERENCE)
+        jacobian = np.concatenate([by_others, by_s[:, :1]], axis=1)
         slope = slope.reshape(len(z), -1)
         sound = np.asarray(sound.reshape(len(z), -1).all(axis=1) & np.isfinite(values).all(axis=(1, 2)))
         return values[:, 0], np.swapaxes(jacobian, 1, 2), self.limits(z, rows, slope[:, 0]), sound
@@ -100,30 +109,40 @@ class Collisions:
         # Along shots of inner shapes the radius of the tow point rises.
         return np.stack([z[:, EXCESS] - low, high - z[:, EXCESS], speed, slope, z[:, S]], axis=1)
 
-    def solve(self, z: Array, rows: Integers, fixed: int) -> tuple[Array, NDArray[np.bool_]]:
+    def solve(self, z: Array, rows: Integers, fixed: int, rounds: int = ROUNDS) -> tuple[Array, NDArray[np.bool_]]:
         """Collisions near points, by Newton's method, with one of the limits fixed at zero, or where `fixed` is -1 the
         length as it is; and which were found."""
-        z, good, length = z.copy(), np.zeros(len(z), bool), np.full(len(z), np.inf)
-        for _ in range(ROUNDS):
-            value, jacobian, limits, sound = self(z, rows)
-            last, gradient = np.zeros(len(z)), np.zeros((len(z), 1, UNKNOWNS))
+        if len(z) > TOGETHER:
+            parts = np.split(np.arange(len(z)), range(TOGETHER, len(z), TOGETHER))
+            solved = [self.solve(z[part], rows[part], fixed, rounds) for part in parts]
+            return np.concatenate([one[0] for one in solved]), np.concatenate([one[1] for one in solved])
+        z, good, last = z.copy(), np.ones(len(z), bool), np.full(len(z), np.inf)
+        i = np.arange(len(z))
+        for _ in range(rounds):
+            check_patience("where flutter begins and ends", REMEDY)
+            value, jacobian, limits, sound = self(z[i], rows[i])
+            wanted, gradient = np.zeros(len(i)), np.zeros((len(i), 1, UNKNOWNS))
             if fixed < 0:
                 gradient[:, 0, EXCESS] = 1.0
             else:
-                last = limits[:, fixed]
+                wanted = limits[:, fixed]
                 for k in range(UNKNOWNS):
                     shift = DIFFERENCE * np.eye(UNKNOWNS)[k]
-                    ahead, behind = (self._limit(z + side * shift, rows, fixed) for side in (1.0, -1.0))
+                    ahead, behind = (self._limit(z[i] + side * shift, rows[i], fixed) for side in (1.0, -1.0))
                     gradient[:, 0, k] = (ahead - behind) / (2.0 * DIFFERENCE)
             matrix = np.concatenate([jacobian, gradient], axis=1)
-            step = solve_systems(matrix, -np.concatenate([value, last[:, None]], axis=1))
+            step = solve_systems(matrix, -np.concatenate([value, wanted[:, None]], axis=1))
             length = np.linalg.norm(step, axis=1)
-            good = sound & np.isfinite(length)
+            good[i] = sound & np.isfinite(length)
             step *= np.minimum(1.0, LONGEST / np.maximum(length, 1e-300))[:, None]
-            z[good] += step[good]
-            if ((length < SETTLED) | ~good).all():
+            z[i[good[i]]] += step[good[i]]
+            # A step that no longer shrinks is rounding.
+            over = ~good[i] | (length < SETTLED) | ((length < NOISE) & (length > 0.5 * last[i]))
+            last[i] = length
+            i = i[~over]
+            if not len(i):
                 break
-        return z, good & (length < 1e3 * SETTLED)
+        return z, good & (last < NOISE)
 
     def _limit(self, z: Array, rows: Integers, fixed: int) -> Array:
         slope = np.zeros(len(z))
@@ -133,11 +152,19 @@ class Collisions:
         return self.limits(z, rows, slope)[:, fixed]
 
 
+def begins(jacobian: Array) -> NDArray[np.bool_]:
+    """Whether flutter begins as the speed rises, or ceases, from the slopes of the equations at collisions."""
+    # Along the branch D = (its slope) (log gamma - there) + (half its curvature) (s - there)^2.
+    with np.errstate(invalid="ignore", divide="ignore"):
+        along = -jacobian[:, 0, SPEED] / jacobian[:, 0, X]
+    return np.asarray((jacobian[:, 1, SPEED] + along * jacobian[:, 1, X]) * jacobian[:, 2, S] > 0.0)
+
+
 SHORT, LONG, FAST, FOLD, REAL = range(5)
 KINDS = ("length", "length", "speed", "fold", "real")
 
 
-def boundaries(start: Array, n: Integers, w_f: Array, domain: Domain) -> list[Boundary]:
+def boundaries(start: Array, n: Integers, w_f: Array, domain: Domain, pool: Executor | None = None) -> list[Boundary]:
     """Whole curves through collisions; those that are on the curve of one before are left out.
 
     Parameters
@@ -147,6 +174,8 @@ def boundaries(start: Array, n: Integers, w_f: Array, domain: Domain) -> list[Bo
     n : ndarray of int, shape (points,)
     w_f : ndarray, shape (points,)
     domain : Domain
+    pool : Executor, optional
+        For threads.
 
     Returns
     -------
@@ -158,13 +187,16 @@ def boundaries(start: Array, n: Integers, w_f: Array, domain: Domain) -> list[Bo
         # One curve of each n and w_f at a time.
         _, first = np.unique(np.stack([n[left].astype(float), w_f[left]]), axis=1, return_index=True)
         now = left[np.sort(first)]
-        equations = Collisions(n[now], w_f[now], domain)
+        equations = Collisions(n[now], w_f[now], domain, pool)
         rows = np.arange(len(now))
         direction = tangents(equations(start[now], rows)[1])
         halves = [follow(equations, start[now], side * direction, _stop, STEPS) for side in (1.0, -1.0)]
         gone = set(now.tolist())
         for row, k in enumerate(now):
-            boundary, points = _whole(Collisions(n[k : k + 1], w_f[k : k + 1], domain), halves[0][row], halves[1][row])
+            if not len(halves[0][row].points) or not len(halves[1][row].points):
+                continue
+            one = Collisions(n[k : k + 1], w_f[k : k + 1], domain, pool)
+            boundary, points = _whole(one, halves[0][row], halves[1][row])
             found.append(boundary)
             same = [i for i in left if n[i] == n[k] and w_f[i] == w_f[k]]
             gone |= {i for i in same if _on_curve(points, start[i])}
@@ -218,6 +250,7 @@ def _whole(equations: Collisions, ahead: Curve, back: Curve) -> tuple[Boundary, 
         r_f=np.exp(points[:, X]) / gamma**2,
         turns=np.array(turns, np.int64),
         error=np.maximum(np.abs(step[:, SPEED]), np.finfo(float).eps),
+        begins=begins(jacobian),
         kinds=(kinds[0], kinds[1]),
     )
     return found, points

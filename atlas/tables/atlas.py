@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from towatlas.checks import (
     check_broadcast,
     check_choice,
+    check_one,
     check_order,
     check_outside,
     check_real,
@@ -17,15 +18,16 @@ from towatlas.checks import (
 )
 from towatlas.labelled import quantity_of, takes_frames
 from towatlas.nomenclature import SYMBOLS
-from towatlas.results import CriticalStates, DragFolds, FishPositions
+from towatlas.results import CriticalStates, DragFolds, FishPositions, FlutterSpeeds, GrowthRates
 from towatlas.tables.critical import QUANTITIES, CriticalTable
 from towatlas.tables.drag_folds import DragFoldTable
 from towatlas.tables.file import default_path, open_group, read_root
 from towatlas.tables.fish import BRANCHES, FishTable
 from towatlas.tables.seal import AtlasFileError
+from towatlas.tables.stability import StabilityTable
 
 NEAR_CHOICES = ("solve", "nan")
-PARTS = (CriticalTable, FishTable, DragFoldTable)
+PARTS = (CriticalTable, FishTable, DragFoldTable, StabilityTable)
 
 
 def open_atlas(path: str | os.PathLike | None = None) -> "Atlas":
@@ -39,7 +41,7 @@ def open_atlas(path: str | os.PathLike | None = None) -> "Atlas":
     Returns
     -------
     Atlas
-        With critical speeds, positions of the fish, folds with drag: whichever the file holds.
+        With critical speeds, positions of the fish, folds with drag, growth rates: whichever the file holds.
 
     Raises
     ------
@@ -62,11 +64,12 @@ def open_atlas(path: str | os.PathLike | None = None) -> "Atlas":
 class Atlas:
     """What a file holds, interpolated. Made by `open_atlas`; safe to share between threads.
 
-    `fish` says where the fish is at any speed, `folds` where pairs of equilibria appear and end with drag, `states` all
-    quantities of the critical states. Each of `critical_speed`, `reaction`, `fish_offset`, `fish_depth`, `tow_tension`,
-    `error` and `status` returns one of them, and takes xarray DataArrays (chunked ones lazily) and pandas Series (by
-    their labels), too; `states`, `fish` and `folds` take a DataFrame with their arguments as columns, and return one.
-    pint quantities are made dimensionless, or refused.
+    `fish` says where the fish is at any speed, `folds` where pairs of equilibria appear and end with drag, `growth` how
+    fast shapes are left in a vacuum, `flutter` at which speeds that begins, `states` all quantities of the critical
+    states. Each of `critical_speed`, `reaction`, `fish_offset`, `fish_depth`, `tow_tension`, `error` and `status`
+    returns one of them, and takes xarray DataArrays (chunked ones lazily) and pandas Series (by their labels), too;
+    `states`, `fish` and `folds` take a DataFrame with their arguments as columns, and return one. pint quantities are
+    made dimensionless, or refused.
 
     Attributes
     ----------
@@ -107,11 +110,11 @@ class Atlas:
 
     @property
     def holds(self) -> tuple[str, ...]:
-        """In words: "critical speeds", "fish positions", "folds with drag"."""
+        """In words: "critical speeds", "fish positions", "folds with drag", "growth rates"."""
         return tuple(part.holds for part in self.parts)
 
     @property
-    def parts(self) -> list[CriticalTable | FishTable | DragFoldTable]:
+    def parts(self) -> list[CriticalTable | FishTable | DragFoldTable | StabilityTable]:
         """What the file holds."""
         return list(self._parts.values())
 
@@ -130,17 +133,22 @@ class Atlas:
         """The part with folds with drag; AtlasFileError if the file does not hold it."""
         return self.part(DragFoldTable)
 
+    @property
+    def stability(self) -> StabilityTable:
+        """The part with growth rates; AtlasFileError if the file does not hold it."""
+        return self.part(StabilityTable)
+
     def part(self, part: Any) -> Any:
         """The part of a class of PARTS.
 
         Parameters
         ----------
         part : type
-            `CriticalTable`, `FishTable` or `DragFoldTable`.
+            One of PARTS.
 
         Returns
         -------
-        CriticalTable, FishTable or DragFoldTable
+        CriticalTable, FishTable, DragFoldTable or StabilityTable
 
         Raises
         ------
@@ -423,6 +431,73 @@ class Atlas:
         lam, w_f, C, n = check_broadcast(**arrays, n=check_order(n))
         table = self.drag.answer(outside, lam=lam.ravel(), w_f=w_f.ravel(), C=C.ravel(), n=n.ravel())
         return DragFolds(n=n, lam=lam, w_f=w_f, C=C, **_shaped(table, n))
+
+    def growth(
+        self, lam: ArrayLike, w_f: ArrayLike, gamma: ArrayLike, n: ArrayLike | None = None, outside: str = "raise"
+    ) -> GrowthRates:
+        """Growth rate of the median shape in a vacuum, or of the inner shape of n nodes.
+
+        Parameters
+        ----------
+        lam, w_f, gamma : array_like
+            Cable length, fish weight and speed [-].
+        n : array_like of int, optional
+            Nodes, >= 1; those of the median shape by default, one more beyond each critical speed.
+        outside : {"raise", "nan", "solve"}
+            What becomes of points outside the table: a ValueError that says how, nan, or the direct solution.
+
+        Returns
+        -------
+        GrowthRates
+            Arrays of the broadcast shape; nan where status is not OK.
+
+        Raises
+        ------
+        ValueError
+            For what is not a number, a choice that does not exist, and points outside with outside="raise".
+        AtlasFileError
+            If the file holds no growth rates.
+
+        Notes
+        -----
+        Nothing is interpolated across a fold, nor across where the number of what grows changes: points next to these
+        are outside.
+        """
+        check_outside(outside)
+        arrays = {"lam": check_real("lam", lam), "w_f": check_real("w_f", w_f), "gamma": check_real("gamma", gamma)}
+        order = np.zeros((), np.int64) if n is None else check_order(n)
+        lam, w_f, gamma, order = check_broadcast(**arrays, n=order)
+        columns = {"lam": lam.ravel(), "w_f": w_f.ravel(), "gamma": gamma.ravel(), "n": order.ravel()}
+        table = self.stability.answer(outside, **columns)
+        return GrowthRates(lam=lam, w_f=w_f, gamma=gamma, **_shaped(table, lam))
+
+    def flutter(self, lam: float, w_f: float, n: int = 1, outside: str = "raise") -> FlutterSpeeds:
+        """Speeds at which the inner shape of n nodes of a cable in a vacuum begins and ceases to flutter.
+
+        Parameters
+        ----------
+        lam, w_f : float
+            Cable length and fish weight [-].
+        n : int
+            Nodes, >= 1.
+        outside : {"raise", "nan"}
+            What becomes of a cable outside the table: a ValueError that says how, or no speeds, with the reason in the
+            status. `towatlas.flutter` computes.
+
+        Returns
+        -------
+        FlutterSpeeds
+
+        Raises
+        ------
+        ValueError
+            For what is not one number, and a cable outside with outside="raise".
+        AtlasFileError
+            If the file holds no growth rates.
+        """
+        check_choice("outside", outside, ("raise", "nan"))
+        lam, w_f, n = check_one("lam", lam), check_one("w_f", w_f, zero=True), int(check_order(n))
+        return FlutterSpeeds(lam, w_f, n, **self.stability.boundaries(outside, lam=lam, w_f=w_f, n=n))
 
     def _quantity(self, name: str, lam: Any, w_f: Any, n: Any, outside: str) -> Any:
         check_outside(outside)

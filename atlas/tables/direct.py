@@ -67,3 +67,36 @@ def drag_folds(*, lam: Array, w_f: Array, C: Array, n: Integers) -> DragFolds:
 
     with patience():
         return solve_drag_folds(lam, w_f, C, n)
+
+
+def growth_rates(*, lam: Array, w_f: Array, gamma: Array, n: Integers) -> dict[str, NDArray[Any]]:
+    """Growth rates of the inner shapes of n nodes in a vacuum.
+
+    Parameters
+    ----------
+    lam, w_f, gamma, n : ndarray, shape (points,)
+
+    Returns
+    -------
+    dict of ndarray, shape (points,)
+        growth, frequency, unstable, kind, error and status; NOT_FOUND where there is no such shape.
+    """
+    from towatlas.kernels import status
+    from towatlas.solve.members import shoot_lanes, solve_members
+    from towatlas.solve.spectra import growth_columns
+    from towatlas.system import nondense_rows
+
+    none = np.zeros(len(n), bool)
+    with patience():
+        shapes = solve_members(lam=lam, w_f=w_f, gamma=gamma, n=n, outer=none, shoot=shoot_lanes)
+        found = growth_columns(
+            nondense_rows(lam=lam, w_f=w_f, C=np.zeros(len(n))),
+            gamma,
+            r_f=np.where(shapes.status == status.OK, np.abs(shapes.x_f), np.nan)[:, None],
+            nodes=n[:, None],
+            index=2 * n[:, None],
+            error=shapes.error[:, None],
+        )
+    codes = np.where(shapes.status == status.OK, found["growth_status"][:, 0], shapes.status)
+    columns = {name: found[name][:, 0] for name in ("growth", "frequency", "unstable", "kind")}
+    return columns | {"error": found["growth_error"][:, 0], "status": codes}
