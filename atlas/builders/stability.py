@@ -51,7 +51,7 @@ def stability_group(grid: StabilityGrid, threads: int | None = None, progress: b
     -------
     xarray.Dataset
     """
-    from towatlas.kernels.variation import threads as available
+    from towatlas.kernels.sweeps import threads as available
 
     every: list[tuple[Rates, tuple[Array, Array], list[Boundary], Sheets]] = []
     columns, points = [], []

@@ -332,8 +332,8 @@ class StabilityTable:
         n = n.copy()
         point: dict[str, NDArray[Any]] = {"lam": lam, "w_f": w_f, "gamma": gamma}
         good = sound(point)
-        (speeds, _), median = self._critical_speeds(lam, w_f), n == 0
-        n[median] = self._median(lam, w_f, gamma, speeds)[median]
+        (speeds, _), median = self._critical_speeds(lam=lam, w_f=w_f), n == 0
+        n[median] = self._median(lam=lam, w_f=w_f, gamma=gamma, speeds=speeds)[median]
         table: dict[str, NDArray[Any]] = {
             **{name: np.full(len(n), np.nan) for name in ("growth", "frequency", "error")},
             "unstable": np.full(len(n), -1),
@@ -362,7 +362,7 @@ class StabilityTable:
                 table[name][missing] = column
         return table | {"n": n}
 
-    def _critical_speeds(self, lam: Array, w_f: Array) -> tuple[Array, Array]:
+    def _critical_speeds(self, *, lam: Array, w_f: Array) -> tuple[Array, Array]:
         """gamma_cn of n to one more than held, and their errors, shape (n, points); nan where there is none, or none is
         held."""
         orders = np.arange(1, self.n_max + 2)
@@ -371,7 +371,7 @@ class StabilityTable:
         table = self.critical.answer(("gamma", "error"), "nan", **columns, n=np.repeat(orders, len(lam)))
         return table["gamma"].reshape(shape), table["error"].reshape(shape)
 
-    def _median(self, lam: Array, w_f: Array, gamma: Array, speeds: Array) -> Integers:
+    def _median(self, *, lam: Array, w_f: Array, gamma: Array, speeds: Array) -> Integers:
         """Nodes of the median shape; -1 where a critical speed that there is is not held."""
         orders = np.arange(1, self.n_max + 2)[:, None]
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
@@ -379,7 +379,7 @@ class StabilityTable:
             passed = (speeds <= gamma).sum(axis=0)
         return np.where((absent | np.isfinite(speeds)).all(axis=0), passed, -1)
 
-    def coordinates(self, n: int, lam: Array, w_f: Array, gamma: Array, fold: Array) -> tuple[Array, Array, Array]:
+    def coordinates(self, n: int, *, lam: Array, w_f: Array, gamma: Array, fold: Array) -> tuple[Array, Array, Array]:
         """Coordinates on the grid of one n, -1 to 1 inside, nan outside.
 
         Parameters
@@ -413,7 +413,7 @@ class StabilityTable:
         w_f: Array,
         gamma: Array,
     ) -> None:
-        places = self.coordinates(n, lam[i], w_f[i], gamma[i], speeds[n - 1, i])
+        places = self.coordinates(n, lam=lam[i], w_f=w_f[i], gamma=gamma[i], fold=speeds[n - 1, i])
         inside = np.isfinite(places[0])
         i, grid = i[inside], self.grids[n - 1]
         y, x, v = (part[inside] for part in places)
@@ -435,7 +435,7 @@ class StabilityTable:
             if not 1 <= n[i] <= self.n_max:
                 return f"the shape has {n[i]} nodes or more; held are 1 to {self.n_max}"
             lam, w_f, gamma = (point[name][i : i + 1] for name in ("lam", "w_f", "gamma"))
-            place = self.coordinates(int(n[i]), lam, w_f, gamma, speeds[n[i] - 1, i : i + 1])
+            place = self.coordinates(int(n[i]), lam=lam, w_f=w_f, gamma=gamma, fold=speeds[n[i] - 1, i : i + 1])
             if np.isfinite(place[0][0]):
                 return f"gamma = {point['gamma'][i]:.15g} is next to where the shape of {n[i]} nodes changes its kind"
             return (
