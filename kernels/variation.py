@@ -154,8 +154,8 @@ KEPT_ROWS = np.array([T, *P.ravel(), *TA.ravel(), *EP.ravel()])
 # Orders of their series: the equations know no more.
 TERMS = np.int64(MOTION_TERMS)
 TWO, SIX = np.int64(2), np.int64(6)
-# Of the series of P, whose entries are at most 1, and of a wave at the end of a step: its last terms. Steps are shortened
-# for a wave's where they are so many times larger.
+# Of the series of P, whose entries are at most 1, and of a wave at the end of a step: its last terms. Steps are
+# shortened for a wave's where they are so many times larger.
 LEFT, LARGER = 1e-15, 4.0
 
 
@@ -188,7 +188,7 @@ def _turn_left(c, k, lane):
 
 @helper
 def _wave_left(c, h, phase, lane, room):
-    """Last term of a wave over the step h, by absolute values; phase is that of the step with the tension it begins with.
+    """Last term of a wave over the step h, by absolute values; phase: of the step, with its first tension.
 
     Above a light fish the tension grows by several times within a step, and the terms fall later.
     """
