@@ -24,7 +24,7 @@ def timed(name, call):
 timed("first critical speed (solve_folds)", lambda: towatlas.solve_critical(10.0, 1.0))
 timed("the same again", lambda: towatlas.solve_critical(10.0, 1.0))
 timed("first curve (seed_folds)", lambda: towatlas.solve_critical(np.geomspace(8, 50, 100), 1.0))
-timed("first table (solve_folds, parallel)", lambda: towatlas.solve_critical(np.geomspace(8, 50, 300), 1.0))
+timed("first table (solve_folds, on all threads)", lambda: towatlas.solve_critical(np.geomspace(8, 50, 300), 1.0))
 from towatlas.kernels.calls import forward_shots, scan_system
 one, out = np.ones(1), [np.empty(1) for _ in range(3)]
 timed("forward_shots", lambda: forward_shots(one, one, one, one, 10, *out, 0, 1))
