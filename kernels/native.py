@@ -70,7 +70,7 @@ def folder() -> Path | None:
     machine = f"{_llvm().get_host_cpu_name()} {features()}"
     key = f"{importlib.metadata.version('numba')}-{hashlib.sha256(machine.encode()).hexdigest()[:8]}"
     try:
-        root = _root()
+        root = cache_root()
         chosen = root / f"{source_hash()[:16]}-numba-{key}"
         chosen.mkdir(parents=True, exist_ok=True)
         if not os.access(chosen, os.W_OK):
@@ -82,7 +82,8 @@ def folder() -> Path | None:
     return chosen
 
 
-def _root() -> Path:
+def cache_root() -> Path:
+    """Where this package keeps what is the same the next time."""
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen) / "towatlas"
     base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
@@ -260,7 +261,7 @@ def warm(groups: Sequence[Sequence[Kernel]], done: Callable[[Kernel], object]) -
     """
     if folder() is None:
         raise OSError(
-            f"nothing can be written under {_root()}: set NUMBA_CACHE_DIR to where compiled kernels may be kept"
+            f"nothing can be written under {cache_root()}: set NUMBA_CACHE_DIR to where compiled kernels may be kept"
         )
 
     def some(group: Sequence[Kernel]) -> None:

@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 from towatlas.checks import short
+from towatlas.kernels.native import cache_root
 
 # Number, unit. The number may be a fraction, "11/16", or a mixed one, "1 1/2".
 _DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -56,7 +57,11 @@ def _registry() -> Any:
     # pint takes a third of a second to import: only who reads units pays.
     import pint
 
-    registry: Any = pint.UnitRegistry()
+    try:
+        # And another to read its own units, but for the first time.
+        registry: Any = pint.UnitRegistry(cache_folder=cache_root() / "pint")
+    except Exception:  # whatever a damaged file raises, or a place where nothing can be written
+        registry = pint.UnitRegistry()
     registry.define("rev = revolution")
     for names in _ALIASES:
         registry.define(f"@alias {names}")

@@ -139,12 +139,30 @@ def shape_of(found: Equilibria, root: str | int = "expected", s: ArrayLike | Non
     if arc.ndim != 1 or not ((arc >= 0.0) & (arc <= lam)).all():
         raise ValueError(f"s must be a list of arc lengths from 0 to lam = {lam:.15g}")
     with patience():
-        line = _vacuum_line(found, k) if found.system.in_vacuum else _drag_line(found, k)
+        line = line_of(found, k)
         s_node = np.sort(lam - _node_heights(found, k, line))
         # The tow point before all others: depths are below it.
         columns = line(lam - np.concatenate([[0.0], arc, s_node]))
         columns[2] = columns[2, 0] - columns[2]
         return _dataset(found, k, arc, columns[:, 1 : 1 + len(arc)], s_node, columns[2, 1 + len(arc) :])
+
+
+def line_of(found: Equilibria, k: int) -> Line:
+    """Shots of one of the equilibria that are known.
+
+    Parameters
+    ----------
+    found : Equilibria
+    k : int
+        Which of them.
+
+    Returns
+    -------
+    callable
+        From arc lengths above the fish, shape (points,), to x, y, the height above the fish, R_x, R_y, R_z, T and the
+        slope of x along the cable, shape (8, points); lengths over the tow radius, forces over (mu + rho A) g R [-].
+    """
+    return _vacuum_line(found, k) if found.system.in_vacuum else _drag_line(found, k)
 
 
 def _vacuum_line(found: Equilibria, k: int) -> Line:

@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from towatlas.effort import patience
 from towatlas.results import Equilibria
-from towatlas.solve.shapes import shape_of
+from towatlas.solve.shapes import line_of
 
 # Samples along the cable, at least, for each node, and at most, each a shot of its own; about the largest it is sampled
 # again, twice, until a parabola through three of them has its top where the tension has.
@@ -61,4 +62,5 @@ def largest_tension(found: Equilibria, row: int) -> tuple[float, float]:
 
 
 def _tensions(found: Equilibria, row: int, s: NDArray[np.float64]) -> NDArray[np.float64]:
-    return shape_of(found, row, s)["T"].values
+    with patience():
+        return line_of(found, row)(found.system.lam - s)[6]
