@@ -36,6 +36,7 @@ COMMANDS = (
     "build",
     "plot",
     "explore",
+    "export",
     "report",
     "info",
     "warmup",

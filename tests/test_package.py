@@ -107,7 +107,7 @@ def test_every_package_is_listed():
 @pytest.mark.network
 def test_the_wheel_holds_what_the_repository_does(wheel):
     """Every module, the scenes, the types of cable, the tables of sources, and the parts of the page."""
-    kinds = ("*.py", "*.toml", "*.csv", "*.npz", "scenes/*.toml", "*.html", "*.css", "*.js")
+    kinds = ("*.py", "*.toml", "*.csv", "*.npz", "scenes/*.toml", "*.html", "*.css", "*.js", "*.txt")
     inside = set(zipfile.ZipFile(wheel).namelist())
     expected = set()
     for package in SETUPTOOLS["packages"]:
