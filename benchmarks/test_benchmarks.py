@@ -22,6 +22,7 @@ from benchmarks import (
     stability,
     targets,
     targets_drag,
+    validation,
     waiting,
 )
 from benchmarks.timing import LOST, Row
@@ -288,3 +289,11 @@ def test_targets_say_whether_they_are_reached():
     verdicts = [targets.Target("a", value, wanted).verdict for value, wanted in ((2.0, 1.0), (0.5, 1.0), (2.0, None))]
     assert verdicts == ["reached", "not reached", "watched"]
     assert all(target.value > 0.0 for target in targets.of_forward_shots(rows=64, segments=10))
+
+
+def test_a_scene_beside_the_chain():
+    """Extrapolation of second order leaves a tenth of what it changes at most, and all numbers are there."""
+    found = validation.compare("skop-fig5", 40)
+    assert [row.quantity for row in found] == ["fish from the axis", "its depth", "tow tension", "growth", "frequency"]
+    assert all(row.apart < 0.1 * row.change / row.size for row in found)
+    assert validation.table(found).count("skop-fig5") == 5
