@@ -35,7 +35,7 @@ def missing() -> bool:
 
 
 @contextmanager
-def _silent() -> Iterator[None]:
+def silent() -> Iterator[None]:
     """It writes every step to the terminal, past Python."""
     kept, nowhere = [os.dup(1), os.dup(2)], os.open(os.devnull, os.O_WRONLY)
     sys.stdout.flush()
@@ -75,7 +75,7 @@ def steady(system: System, gamma: float, segments: int, turns: int = TURNS) -> t
     path = np.stack([np.cos(angle), np.sin(angle), np.full(len(angle), -towed.depth)], axis=1)
     pace = (np.diff(path, axis=0) / dt).tolist()
     radii = np.empty(len(pace))
-    with tempfile.TemporaryDirectory() as folder, _silent():
+    with tempfile.TemporaryDirectory() as folder, silent():
         (Path(folder) / STATE).write_bytes(state_bytes(nodes, turned(nodes, speed)))
         deck = Path(folder) / "deck"
         deck.write_text(deck_text(towed, nodes, stiffness))
