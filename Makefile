@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 ATLAS := build/atlas.nc
 
 .DEFAULT_GOAL := help
-.PHONY: help install atlas seeds equilibria drag stability test bench failures types check figures clean
+.PHONY: help install atlas dist seeds equilibria drag stability test bench failures types check figures clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
@@ -22,6 +22,12 @@ $(VENV)/installed: pyproject.toml atlas/__init__.py
 atlas: install  ## compile what is compiled once, and build build/atlas.nc
 	$(BIN)/python -m towatlas warmup
 	$(BIN)/python -m towatlas build --out $(ATLAS)
+
+# The atlas lies among the modules only while it is packed: in a clone it would hide that there is none in build.
+dist: atlas  ## build/dist: a wheel with the atlas in it, and the sources with it and the tests
+	$(BIN)/pip install --quiet --disable-pip-version-check build
+	cp $(ATLAS) atlas/tables/atlas.nc
+	$(BIN)/pyproject-build --outdir build/dist; done=$$?; rm -f atlas/tables/atlas.nc; exit $$done
 
 seeds: atlas  ## shorten the series of build/atlas.nc into atlas/solve/fold_series.npz, which direct solutions start from
 	$(BIN)/python -m towatlas.builders.fold_series $(ATLAS)

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from towatlas.tables.atlas import Atlas, open_atlas
     from towatlas.tables.seal import AtlasFileError
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = [
     "Atlas",
     "AtlasFileError",

@@ -10,9 +10,12 @@ import sys
 from collections.abc import Iterable
 from contextlib import nullcontext
 from importlib import import_module
+from pathlib import Path
+from typing import Any
 
 from towatlas import __version__
 from towatlas.commands.common import FAILED, FILE, OK, USAGE, announce_compilation, say, shown_progress
+from towatlas.commands.examples import add_examples
 from towatlas.effort import patience
 from towatlas.kernels.notice import CompilerError
 from towatlas.tables.seal import AtlasFileError
@@ -53,11 +56,36 @@ def _parser(names: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
         "--margin, cable.breaking_strength).",
     )
     parser.add_argument("--version", action="version", version=f"towatlas {__version__}")
+    parser.add_argument(
+        "--print-completion",
+        action=_PrintCompletion,
+        choices=("bash", "zsh", "tcsh"),
+        metavar="SHELL",
+        help="print what makes bash, zsh or tcsh complete commands and options, and exit; needs the extra completion",
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     for name in names:
         import_module(f"towatlas.commands.{name}").add(commands)
+        add_examples(commands.choices[name], name)
     return parser
+
+
+class _PrintCompletion(argparse.Action):
+    """Print what makes a shell complete commands, options and names of files."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option: str | None = None) -> None:
+        try:
+            import shtab
+        except ImportError:
+            parser.error(f"{option} needs shtab, which is not installed: pip install 'towatlas[completion]'")
+        commands = next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+        for command in commands.choices.values():
+            for action in command._actions:
+                if action.type is Path or action.metavar in ("SCENE", "FILE", "SPEC", "DEVICE.toml"):
+                    action.complete = shtab.FILE  # type: ignore[attr-defined]
+        print(shtab.complete(parser, values))
+        parser.exit()
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -26,12 +26,29 @@ def main() -> None:
     """Compile what the first argument of the process names: sizes and object files, one after the other, on stdout."""
     features, names = json.loads(sys.argv[1])
     os.environ["NUMBA_CPU_FEATURES"] = features
+    _optimise_once()
     with os.fdopen(os.dup(1), "wb") as out:
         os.dup2(2, 1)  # whatever else is printed
         for module, name in names:
             kernel = next(found for found in calls.KERNELS if (found.module, found.name) == (module, name))
             code = object_code(kernel, features)
             out.write(len(code).to_bytes(8, "little") + code)
+
+
+def _optimise_once() -> None:
+    """Have LLVM optimise a kernel together with all it calls, and not each of these before, level by level."""
+    from numba.core.codegen import CPUCodeLibrary
+
+    # Private to numba, and only a matter of time: left alone where there is no such method.
+    optimise: Any = getattr(CPUCodeLibrary, "_optimize_final_module", None)
+    if optimise is not None:
+        whole = {kernel.name for kernel in calls.KERNELS}
+
+        def once(library: Any) -> None:
+            if library.name in whole:
+                optimise(library)
+
+        setattr(CPUCodeLibrary, "_optimize_final_module", once)  # noqa: B010
 
 
 def object_code(kernel: Kernel, features: str) -> bytes:

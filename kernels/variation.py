@@ -154,8 +154,9 @@ KEPT_ROWS = np.array([T, *P.ravel(), *TA.ravel(), *EP.ravel()])
 # Orders of their series: the equations know no more.
 TERMS = np.int64(MOTION_TERMS)
 TWO, SIX = np.int64(2), np.int64(6)
-# Of the series of P, whose entries are at most 1, at the end of a step: its last terms.
-LEFT = 1e-15
+# Of the series of P, whose entries are at most 1, and of a wave at the end of a step: its last terms. Steps are
+# shortened for a wave's where they are so many times larger.
+LEFT, LARGER = 1e-15, 4.0
 
 
 @helper
@@ -186,9 +187,27 @@ def _turn_left(c, k, lane):
 
 
 @helper
-def _shorten(c, p, h, lane, reach, bound):
-    """Step within h in which solutions for |sigma| <= reach change by a factor of about exp(bound), and which the
-    series of P resolves: in a layer, where the cable turns, the shot's own step need not."""
+def _wave_left(c, h, phase, lane, room):
+    """Last term of a wave over the step h, by absolute values; phase: of the step, with its first tension.
+
+    Above a light fish the tension grows by several times within a step, and the terms fall later.
+    """
+    tension = c[T * KEPT * LANES + lane]
+    room[:] = 1.0
+    for k in range(ORDER):
+        total, power = 0.0, 1.0
+        for o in range(k + 1):
+            total += abs(c[(T * KEPT + o) * LANES + lane]) * power * room[0, k - o]
+            power *= h
+        room[0, k + 1] = phase * room[1, k] / (k + 1)
+        room[1, k + 1] = phase * total / tension / (k + 1)
+    return max(room[0, ORDER], room[1, ORDER])
+
+
+@helper
+def _shorten(c, p, h, lane, reach, bound, room):
+    """Step within h in which solutions for |sigma| <= reach change by a factor of about exp(bound), and which their
+    series and that of P resolve: in a layer, where the cable turns, the shot's own step need not."""
     for k in range(ORDER - 2, ORDER):
         left = _turn_left(c, k, lane)
         if left * h**k > LEFT:
@@ -196,8 +215,13 @@ def _shorten(c, p, h, lane, reach, bound):
     tension = c[T * KEPT * LANES + lane]
     fast = reach + 1.0
     wave = np.sqrt(fast * (tension * fast + _norm(c, TA[0, 0], lane)))
-    rate = max(wave, _norm(c, EP[0, 0], lane))
-    return min(h, bound / (rate * p[PACE * LANES + lane]))
+    rate, pace = max(wave, _norm(c, EP[0, 0], lane)), p[PACE * LANES + lane]
+    h = min(h, bound / (rate * pace))
+    for _ in range(2):
+        left = _wave_left(c, h, h * pace * wave, lane, room)
+        if left > LEFT * LARGER:
+            h *= (LEFT / left) ** (1.0 / ORDER)
+    return h
 
 
 @kernel
@@ -213,7 +237,7 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
     p, new, h, target, ends, room = aligned(PARAMETERS), aligned(STATE), aligned(1), aligned(1), aligned(1), aligned(3)
     paid, low = np.zeros(LANES), np.zeros(LANES)
     work = (c, scratch, p, ends, paid, low)
-    groups = np.full(GROUPS, True)
+    groups, terms = np.full(GROUPS, True), np.empty((2, ORDER + 1))
     for first in range(begin, stop, LANES):
         jobs, fresh, ended = np.full(LANES, IDLE), np.zeros(LANES, np.bool_), np.zeros(LANES, np.bool_)
         for lane in range(LANES):
@@ -240,7 +264,7 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
             step_lengths(c, p, count, TRUNCATION, room, h)
             for lane in range(LANES):
                 if jobs[lane] != IDLE:
-                    h[lane] = _shorten(c, p, h[lane], lane, reach[jobs[lane]], bound)
+                    h[lane] = _shorten(c, p, h[lane], lane, reach[jobs[lane]], bound, terms)
             store(room, TWO, values(c, U * KEPT, FIRST, load(h, ZERO)))
             for lane in range(LANES):
                 ended[lane] = False

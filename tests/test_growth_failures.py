@@ -9,7 +9,9 @@ from test_stability import AIR, galerkin, motion_of
 
 import towatlas
 from benchmarks.stability import CASES, reference
+from towatlas.solve.motion import BOUND, motions
 from towatlas.solve.spectrum import polish, together
+from towatlas.system import System
 
 # Largest |sigma| that the program looks at, over gamma.
 REACH = 4.0
@@ -100,3 +102,20 @@ def test_secants_at_a_double_root():
         assert abs(pair[0] - pair[1]) < 1e-4
         middles.append(pair.mean())
     assert abs(middles[0] - middles[1]) < 1e-12
+
+
+def test_a_light_fish_whose_cable_soon_carries_itself():
+    """The tension triples within a step that the growth of waves alone would allow: their terms fall later, and the
+    frequency was off by 1e-11. Steps four times as short say the same now."""
+    lam, w_f, gamma, C = 1.152, 0.00494, 0.168, 0.0156
+    found = towatlas.equilibria(lam, w_f, gamma, C=C)
+    result = towatlas.stability_of(found)
+    leading = result.eigenvalues[0][0] / gamma
+    row = System.of(lam=lam, w_f=w_f, C=C).row()[None]
+    speed, reach = np.array([gamma]), 1.1 * abs(leading)
+    coarse, fine = (motions(found.r_f[:1], speed, row, reach, bound)[0] for bound in (BOUND, BOUND / 4.0))
+    guess = np.array([leading])
+    exact = polish(fine, guess, guess)[0].sigma[0]
+    assert abs(leading - exact) < 1e-14 * abs(exact)
+    # Of the tension over that of the fish: the last step begins with a hundred times as much.
+    assert coarse.series[-1, 0, 0] > 100.0 * coarse.series[0, 0, 0]

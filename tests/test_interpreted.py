@@ -33,9 +33,11 @@ from towatlas.system import System
 EPS = 2.0**-52
 
 # a, mu, tau of shots: a bare tip, a shot that ends within its series, a light and a heavy fish.
-SHOTS = np.array([[0.7, 0.0, 12.0], [2.0, 0.0, 1e-6], [0.8, 1e-11, 6.0], [3.0, 5.0, 40.0], [20.0, 900.0, 60.0]]).T
+SHOTS = np.array(
+    [[0.7, 0.0, 12.0], [2.0, 0.0, 1e-6], [0.8, 1e-11, 6.0], [3.0, 5.0, 40.0], [20.0, 900.0, 60.0]]
+).T.copy()
 # lam, w_f, n of cables: the report's, two without a fish, one near its threshold.
-CABLES = np.array([[37.8, 1352.0, 2], [10.0, 0.0, 1], [4.4, 0.0, 2], [3.5, 0.01, 1]]).T
+CABLES = np.array([[37.8, 10.0, 4.4, 3.5], [1352.0, 0.0, 0.0, 0.01], [2, 1, 2, 1]])
 # gamma, r_f and system of shots with drag: nothing but the vacuum; normal drag; tangential drag too; a bare tip with
 # drag; side force.
 DRAG = [

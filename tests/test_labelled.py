@@ -33,7 +33,8 @@ def labels():
 )
 def test_a_ratio_is_made_dimensionless(atlas_file, given, plain):
     for function in (atlas_file.critical_speed, lambda *cable: towatlas.solve_critical(*cable).gamma):
-        np.testing.assert_array_equal(function(given, 1.0), function(np.array(plain), 1.0))
+        # One cable is looked up in plain numbers, which round in another order.
+        np.testing.assert_allclose(function(given, 1.0), function(np.array(plain), 1.0), rtol=1e-14)
     xarray = xr.DataArray(np.atleast_1d(plain), dims="cable")
     np.testing.assert_array_equal(
         atlas_file.critical_speed(xarray, Q(100, "cm/m")), atlas_file.critical_speed(xarray, 1.0)

@@ -8,8 +8,10 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 import pytest
@@ -21,8 +23,12 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 SETUPTOOLS = PROJECT["tool"]["setuptools"]
 # Names of folders here, and of other people's packages.
 BARE = {"atlas", "kernels"}
+# What packing adds to the files of the repository: the atlas, and what setuptools writes.
+SHIPPED = "atlas/tables/atlas.nc"
+GENERATED = re.compile(r"PKG-INFO|setup\.cfg|towatlas\.egg-info/")
 
-# A small build, a lookup, a shipped scene: with the dependencies that pyproject declares, and nothing else.
+# A small build, lookups in it and in the atlas of the wheel, a shipped scene: with the dependencies that pyproject
+# declares, and nothing else.
 VISIT = """
 from pathlib import Path
 import atlas, kernels, netCDF4, numpy as np, towatlas, towatlas.kernels
@@ -43,6 +49,7 @@ else:
 grid = Grid(n_max=1, series_w_f=6, series_excess=8, error_blocks=1, w_f=np.array([0.0, 1.0]), lam=np.array([3.0, 9.0]))
 scan = ScanSettings(speeds=40, guesses=64, w_f=np.array([1.0]), lam=np.array([5.0]), n_max=1)
 build_atlas(Path("small.nc"), grid=grid, scan=scan, progress=False)
+assert abs(towatlas.open_atlas().critical_speed(37.8, 1352, n=2) / 3.417567056914 - 1.0) < 1e-10
 assert 0.4 < towatlas.open_atlas("small.nc").critical_speed(9.0, 1.0) < 0.6
 with netCDF4.Dataset("small.nc") as file:
     difference = file["gamma_c"][0, 1, 1] / towatlas.solve_critical(9.0, 1.0).gamma - 1.0
@@ -59,9 +66,15 @@ def run(command, **options):
 
 
 def tracked(*patterns):
-    """Files of the repository, new ones included, as paths relative to its root."""
-    names = run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "--", *patterns], cwd=ROOT)
-    return [Path(name) for name in names.splitlines() if (ROOT / name).exists()]
+    """Files of the repository, new ones included, or of the unpacked sources, as paths relative to the root."""
+    if (ROOT / ".git").exists():
+        listed = run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "--", *patterns], cwd=ROOT)
+        names = listed.splitlines()
+    else:
+        listed = (ROOT / "towatlas.egg-info" / "SOURCES.txt").read_text()
+        names = [name for name in listed.splitlines() if any(fnmatchcase(name, one) for one in patterns or ["*"])]
+        names = [name for name in names if name != SHIPPED and not GENERATED.match(name)]
+    return [Path(name) for name in names if (ROOT / name).exists()]
 
 
 def copy_tree(target):
@@ -83,10 +96,23 @@ def registry(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def wheel(registry, tmp_path_factory):
-    """The wheel, built from a copy: a build folder of earlier days would lend it modules that are gone."""
-    source, out = copy_tree(tmp_path_factory.mktemp("source")), tmp_path_factory.mktemp("wheel")
-    run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", out, source])
+def sdist(registry, tmp_path_factory, atlas_path):
+    """The sources with an atlas, as `make dist` packs them, from a copy: an old build folder adds nothing."""
+    source, out, tools = (tmp_path_factory.mktemp(name) for name in ("source", "sdist", "tools"))
+    copy_tree(source)
+    shutil.copy(atlas_path, source / SHIPPED)
+    run([sys.executable, "-m", "pip", "install", "--quiet", "--target", tools, "setuptools>=69"])
+    code = f"from setuptools.build_meta import build_sdist; build_sdist({str(out)!r})"
+    run([sys.executable, "-c", code], cwd=source, env=os.environ | {"PYTHONPATH": str(tools)})
+    (path,) = out.iterdir()
+    return path
+
+
+@pytest.fixture(scope="module")
+def wheel(sdist, tmp_path_factory):
+    """The wheel, built from the sources as they are packed."""
+    out = tmp_path_factory.mktemp("wheel")
+    run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", out, sdist])
     (path,) = out.iterdir()
     return path
 
@@ -105,11 +131,32 @@ def test_every_package_is_listed():
 
 
 @pytest.mark.network
+def test_the_sources_hold_the_repository(sdist):
+    """Tests, their data, documentation and all: whoever unpacks them can test and build."""
+    with tarfile.open(sdist) as archive:
+        inside = {member.name.partition("/")[2] for member in archive.getmembers() if member.isfile()}
+    assert {name for name in inside if not GENERATED.match(name)} == {*map(str, tracked()), SHIPPED}
+
+
+@pytest.mark.network
+def test_the_description_links_nowhere_but_to_sites(wheel):
+    """A package index shows it: a link to a file of the repository would lead to a page of the index."""
+    archive = zipfile.ZipFile(wheel)
+    (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+    fields, _, description = archive.read(name).decode().partition("\n\n")
+    assert "Description-Content-Type: text/markdown" in fields
+    assert "At what speed will a cable towed in a circle jump" in description
+    targets = re.findall(r"\]\(([^)]*)\)", description)
+    assert not [target for target in targets if not target.startswith("https://")]
+    assert "`docs/scenes.md`" in description
+
+
+@pytest.mark.network
 def test_the_wheel_holds_what_the_repository_does(wheel):
-    """Every module, the scenes, the types of cable, the tables of sources, and the parts of the page."""
+    """Every module, the scenes, the types of cable, the tables of sources, the parts of the page, and the atlas."""
     kinds = ("*.py", "*.toml", "*.csv", "*.npz", "scenes/*.toml", "*.html", "*.css", "*.js", "*.txt")
     inside = set(zipfile.ZipFile(wheel).namelist())
-    expected = set()
+    expected = {SHIPPED.replace("atlas", "towatlas", 1)}
     for package in SETUPTOOLS["packages"]:
         folder = ROOT / folder_of(package)
         files = [path for kind in kinds for path in folder.glob(kind)]
@@ -130,7 +177,8 @@ def test_lives_beside_packages_named_atlas_and_kernels(wheel, tmp_path):
     run([python, "-m", "pip", "install", "--quiet", wheel, "kernels", other])
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    kept = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "TOWATLAS_FILE")}
+    environment = kept | {"XDG_DATA_HOME": str(elsewhere)}
     assert run([python, "-c", VISIT], cwd=elsewhere, env=environment).startswith("visited")
 
 
@@ -157,6 +205,11 @@ def test_one_version():
     assert "version" in PROJECT["project"]["dynamic"]
     assert importlib.metadata.version("towatlas") == towatlas.__version__
     assert run([sys.executable, "-m", "towatlas", "--version"]).split() == ["towatlas", towatlas.__version__]
+
+
+def test_citation_and_changelog_know_the_version():
+    assert re.search(rf"^version: {re.escape(towatlas.__version__)}$", (ROOT / "CITATION.cff").read_text(), re.M)
+    assert f"\n## {towatlas.__version__}\n" in (ROOT / "CHANGELOG.md").read_text()
 
 
 def test_promised_pythons_are_the_classifiers():

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from towatlas.commands.common import OK, threads
-from towatlas.tables.file import EQUILIBRIA_PATH, default_path
+from towatlas.tables.file import built_path, data_folder
 
 
 def add(commands: Any) -> None:
@@ -15,7 +15,8 @@ def add(commands: Any) -> None:
         "--out",
         type=Path,
         metavar="FILE",
-        help=f"default {default_path()}, {EQUILIBRIA_PATH} for --equilibria, build/scan.nc for --method scan",
+        help="default: $TOWATLAS_FILE, else atlas.nc in your data folder (in a clone of the repository its folder "
+        "build); equilibria.nc there for --equilibria, scan.nc for --method scan",
     )
     parser.add_argument(
         "--equilibria",
@@ -53,7 +54,7 @@ def _run(options: argparse.Namespace) -> int:
             raise ValueError("--method says how critical speeds are found; a table of --equilibria has one method")
         from towatlas.builders.fish import build_equilibria
 
-        print(build_equilibria(options.out or EQUILIBRIA_PATH, **how))
+        print(build_equilibria(options.out or data_folder() / "equilibria.nc", **how))
         return OK
     if options.drag or options.stability:
         if options.drag and options.stability:
@@ -63,14 +64,15 @@ def _run(options: argparse.Namespace) -> int:
         if options.stability:
             from towatlas.builders.stability import build_stability
 
-            print(build_stability(options.out or default_path(), **how))
+            print(build_stability(options.out or built_path(), **how))
             return OK
         from towatlas.builders.drag_folds import build_drag
 
-        print(build_drag(options.out or default_path(), **how))
+        print(build_drag(options.out or built_path(), **how))
         return OK
     from towatlas.builders.critical import build_atlas
 
     method = options.method or "fold"
-    print(build_atlas(options.out or (default_path() if method == "fold" else Path("build/scan.nc")), method, **how))
+    out = options.out or (built_path() if method == "fold" else data_folder() / "scan.nc")
+    print(build_atlas(out, method, **how))
     return OK

@@ -14,7 +14,6 @@ from typing import Any
 from towatlas import effort
 from towatlas.kernels import notice
 from towatlas.nomenclature import EQUILIBRIUM
-from towatlas.tables.file import default_path
 
 OK, FAILED, USAGE, OUTSIDE, NO_STATE, FILE, LIMIT = 0, 1, 2, 3, 4, 5, 6
 # Of what --json prints; raised when a key changes its name or its meaning, or goes.
@@ -161,9 +160,8 @@ def add_atlas(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--atlas",
         type=Path,
-        default=default_path(),
         metavar="FILE",
-        help="default %(default)s; $TOWATLAS_FILE sets another",
+        help="default: $TOWATLAS_FILE, else what `towatlas build` made, else the one that came with the package",
     )
 
 

@@ -18,12 +18,9 @@ turn          the tightest turn in which it circles steadily
 cycle         how it swings, where it does
 tangle        the turns in which two lines lie on one bearing: DEVICE.toml with [[line]] twice
 
-  towatlas device points --k 1 --alpha=-80deg --R 1.5
-  towatlas device turn device.toml
-
 Without a file lengths are over that of the line, times over 1/omega, tensions over m L omega^2. With one, metres,
 seconds and newtons. DEVICE.toml has [line] with length, mass, k and alpha, or lift_area, drag_area and density in place
-of both, and [tow] with radius and speed: docs/device.md."""
+of both, and [tow] with radius and speed."""
 
 
 @dataclass(frozen=True)

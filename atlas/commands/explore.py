@@ -22,7 +22,6 @@ def add(commands: Any) -> None:
         "circle and speed; the shapes at the speed, critical speeds, what lasts, tension. Without drag the page "
         "computes everything itself, for any cable; with drag it has tables, of SCENE and the scenes shipped, from a "
         "quarter of the speed to twice the speed.",
-        epilog="As: towatlas explore --out explore.html search.toml",
     )
     parser.add_argument("scene", nargs="?", metavar="SCENE", help="a scene, on show first; default: those shipped only")
     parser.add_argument("--model", choices=MODELS, help="of SCENE; default: the least that holds, with drag")

@@ -20,7 +20,6 @@ def add(commands: Any) -> None:
         description="A folder from which MoorDyn v2, lumped masses in the time domain, tows one shape of a scene on: "
         "an input deck, a state file with the computed shape and its rotation, a driver and a README. By the model "
         "that `towatlas scene` chooses.",
-        epilog="As: towatlas export skop-fig3 --moordyn DIR --branch 'shape 2' --model air; then: python DIR/drive.py",
     )
     parser.add_argument("scene", metavar="SCENE", help="a scene, the name of one that is shipped, or -")
     parser.add_argument("--moordyn", type=Path, required=True, metavar="DIR", help="a folder that is empty, or made")

@@ -7,7 +7,7 @@ from typing import Any
 from towatlas.commands.common import FAILED, NO_STATE, OK, OUTSIDE, add_cable, add_patience, print_json, say
 from towatlas.kernels import status
 from towatlas.tables.atlas import open_atlas
-from towatlas.tables.file import EQUILIBRIA_PATH
+from towatlas.tables.file import data_folder
 from towatlas.tables.fish import BRANCHES
 
 
@@ -21,7 +21,9 @@ def add(commands: Any) -> None:
     )
     add_cable(parser)
     parser.add_argument("--branch", choices=BRANCHES, help="one branch; without it both")
-    parser.add_argument("--table", type=Path, default=EQUILIBRIA_PATH, metavar="FILE", help="default %(default)s")
+    parser.add_argument(
+        "--table", type=Path, metavar="FILE", help="default: where `towatlas build --equilibria` puts it"
+    )
     parser.add_argument("--solve", action="store_true", help="solve directly what lies outside the table")
     parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
     add_patience(parser)
@@ -29,7 +31,7 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    table = open_atlas(options.table)
+    table = open_atlas(options.table or data_folder() / "equilibria.nc")
     rows = []
     worst = OK
     for branch in (options.branch,) if options.branch else BRANCHES[::-1]:

@@ -16,22 +16,23 @@ def add(commands: Any) -> None:
         "info", help="what a file holds", description="Domain, versions, errors and seal of a file."
     )
     parser.add_argument(
-        "file", type=Path, nargs="?", default=default_path(), metavar="FILE", help="default %(default)s"
+        "file", type=Path, nargs="?", metavar="FILE", help="default: the atlas that is used when none is named"
     )
     parser.set_defaults(run=_run)
 
 
 def _run(options: argparse.Namespace) -> int:
-    attributes, _, seal = read_root(options.file)
-    rows = {"file": str(options.file)}
+    path = options.file or default_path()
+    attributes, _, seal = read_root(path)
+    rows = {"file": str(path)}
     if attributes.get("method") == METHOD:
-        rows |= {"holds": "proofs of nodes of an atlas"} | read_certified(options.file).facts()
+        rows |= {"holds": "proofs of nodes of an atlas"} | read_certified(path).facts()
     elif attributes.get("method") != "scan":
-        atlas = Atlas(options.file)
+        atlas = Atlas(path)
         rows["holds"] = ", ".join(atlas.holds)
         for part in atlas.parts:
             rows |= part.domain()
-        beside = options.file.with_name("certified.nc")
+        beside = path.with_name("certified.nc")
         if beside.exists() and (proofs := read_certified(beside)).atlas_seal == seal:
             rows |= {f"{beside.name}: {name}": text for name, text in proofs.facts().items()}
     for name in sorted(attributes):

@@ -26,7 +26,7 @@ def add(commands: Any) -> None:
         "map",
         help="shapes, folds and growth rates of very many systems, on many processes",
         description="Compute a map from its spec, on all cores of this machine or on a dask cluster, and put it "
-        "together in DIR/map.zarr; or, with --at and --plot, look one up. docs/maps.md lists the keys of a spec.",
+        "together in DIR/map.zarr; or, with --at and --plot, look one up.",
     )
     parser.add_argument(
         "what", metavar="SPEC", help="a TOML file or the name of a shipped spec; with --at or --plot a map"

@@ -20,19 +20,19 @@ def add(commands: Any) -> None:
         description="Draw the figures of a source document and recompute what it says: one HTML page that needs "
         f"nothing else. {listed}.",
     )
-    parser.add_argument("source", nargs="?", choices=SOURCES, default="nrl7048", help="default %(default)s")
+    parser.add_argument("source", nargs="?", choices=tuple(SOURCES), default="nrl7048", help="default %(default)s")
     parser.add_argument(
         "--out",
         type=Path,
         metavar="FILE",
-        help=f"FILE.html, default {', '.join(f'build/{source.file}' for source in SOURCES.values())}",
+        help=f"FILE.html, default {', '.join(source.file for source in SOURCES.values())}",
     )
     add_patience(parser)
     parser.set_defaults(run=_run, patience=SECONDS)
 
 
 def _run(options: argparse.Namespace) -> int:
-    out = options.out or Path("build") / SOURCES[options.source].file
+    out = options.out or Path(SOURCES[options.source].file)
     if out.suffix.lower() not in (".html", ".htm"):
         raise ValueError(f"--out {out}: the ending must be .html or .htm")
     say(f"wrote {write_report(out, options.source)}")

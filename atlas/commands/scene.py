@@ -27,6 +27,7 @@ from towatlas.scene.scene import KNOT, MODELS, Scene
 from towatlas.scene.sensitivities import sensitivities_of
 from towatlas.scene.verdicts import verdicts_of
 from towatlas.tables.atlas import Atlas, open_atlas
+from towatlas.tables.file import default_path
 
 MEDIA = {"vacuum": "a vacuum", "air": "a nondense fluid", "water": "a dense fluid"}
 # Of an equilibrium: names in JSON, and what the table calls them.
@@ -52,7 +53,7 @@ def add(commands: Any) -> None:
         "It ends with which shapes last, the largest tension, and the nearest jumps with what they cost. "
         f"Scenes that come with the package, by name: {', '.join(shipped_scenes())}.",
     )
-    parser.add_argument("file", metavar="FILE", help="a scene, - for one on standard input; see docs/scenes.md")
+    parser.add_argument("file", metavar="FILE", help="a scene, - for one on standard input")
     add_speed(parser)
     parser.add_argument("--model", choices=MODELS, help="this one, compared with no other; default: the least")
     parser.add_argument(
@@ -116,8 +117,9 @@ def scene_of(path: str, options: argparse.Namespace) -> Scene:
     return scene if all(value is None for value in given.values()) else scene.at(**given)
 
 
-def atlas_if_any(path: Path) -> Atlas | None:
+def atlas_if_any(path: Path | None) -> Atlas | None:
     """The atlas, or None where there is no such file; a damaged one is an error."""
+    path = path or default_path()
     return open_atlas(path) if path.exists() else None
 
 

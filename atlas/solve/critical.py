@@ -48,6 +48,8 @@ def solve_rows(
     from towatlas.kernels.calls import SLOPES, Cables, Folds, solve_folds
     from towatlas.kernels.sweeps import solve_folds_parallel
 
+    lam, w_f, excess = (np.array(column, float, order="C") for column in (lam, w_f, excess))
+    n = np.array(n, np.int64, order="C")
     rows = len(n)
     if guess is None:
         a, gamma, slopes = seed(lam=lam, w_f=w_f, n=n, excess=excess, solve=solve_rows)
@@ -56,8 +58,7 @@ def solve_rows(
     states = np.empty((rows, 4))
     error = np.empty(rows)
     codes = np.empty(rows, np.int64)
-    # Kernels take whole arrays, not broadcast views.
-    columns = [np.array(column, order="C") for column in (lam, w_f, n, excess)]
+    columns = [lam, w_f, n, excess]
     solved = a, gamma, slopes, states, error, codes
     max_steps = scaled(STEPS, MOST_STEPS)
     # A shot to a fold with more of them than that ends at its last step.

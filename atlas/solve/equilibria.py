@@ -176,7 +176,7 @@ def _boundary_errors(system: System, gamma: float, r_x0: Array) -> Array:
     """E of Eq. (33) of forward shots: an independent witness."""
     from towatlas.kernels.calls import forward_shots
 
-    rows = len(r_x0)
+    rows, r_x0 = len(r_x0), np.ascontiguousarray(r_x0)
     errors, x_end, r_x_end = np.empty(rows), np.empty(rows), np.empty(rows)
     cable = [np.full(rows, value) for value in (system.lam, system.w_f, gamma)]
     for part in batches(np.ones(rows), WITNESSES_A_CALL):

@@ -136,6 +136,7 @@ def _in_batches(
     shoot: Callable[..., None], steps_a_call: int, a: Array, mu: Array, tau: Array
 ) -> tuple[Array, Integers, Integers]:
     """Shots in calls of a few seconds each; those too long for one are not begun, and their status is STEP_LIMIT."""
+    a, mu, tau = (np.ascontiguousarray(column, float) for column in (a, mu, tau))
     rows = len(a)
     ends, counts, statuses = np.full((rows, 6), np.nan), np.zeros(rows, np.int64), np.full(rows, status.STEP_LIMIT)
     max_steps = scaled(STEPS, MOST_STEPS)

@@ -36,7 +36,7 @@ def open_atlas(path: str | os.PathLike | None = None) -> "Atlas":
     Parameters
     ----------
     path : path, optional
-        The file; without it $TOWATLAS_FILE, else build/atlas.nc.
+        The file; without it $TOWATLAS_FILE, else what `towatlas build` made, else the one that came with the package.
 
     Returns
     -------
@@ -48,7 +48,8 @@ def open_atlas(path: str | os.PathLike | None = None) -> "Atlas":
     FileNotFoundError
         If there is no such file.
     AtlasFileError
-        If the file is damaged (a single changed bit is noticed), holds none of these, or is of a newer version.
+        If the file is damaged (a single changed bit is noticed), holds none of these, or is of a newer version; if
+        $TOWATLAS_FILE is empty.
 
     Examples
     --------

@@ -13,10 +13,53 @@ if TYPE_CHECKING:
     import netCDF4
 
 SCHEMA_VERSION = 1
-# Where the files are put by default, and looked for.
-EQUILIBRIA_PATH = Path("build/equilibria.nc")
+VARIABLE = "TOWATLAS_FILE"
+# The atlas that a wheel brings along.
+SHIPPED = Path(__file__).with_name("atlas.nc")
 
 _NETCDF = threading.Lock()
+
+
+def data_folder() -> Path:
+    """Where files are put by default, and looked for.
+
+    Returns
+    -------
+    Path
+        `build` where the working folder is a clone of the repository, else the user's data folder for towatlas.
+    """
+    if Path("atlas/tables", Path(__file__).name).is_file():
+        return Path("build")
+    # Who names a file does not wait for the library.
+    from platformdirs import user_data_path
+
+    return user_data_path("towatlas", appauthor=False)
+
+
+def _named() -> Path | None:
+    """What $TOWATLAS_FILE names, None where it is not set."""
+    text = os.environ.get(VARIABLE)
+    if text is None:
+        return None
+    if not text.strip():
+        raise AtlasFileError(f"{VARIABLE} is empty: unset it, or let it name a file")
+    return Path(os.path.expanduser(text))
+
+
+def built_path() -> Path:
+    """Where an atlas is put when no place is named.
+
+    Returns
+    -------
+    Path
+        $TOWATLAS_FILE, else atlas.nc in `data_folder()`.
+
+    Raises
+    ------
+    AtlasFileError
+        If $TOWATLAS_FILE is empty.
+    """
+    return _named() or data_folder() / "atlas.nc"
 
 
 def default_path() -> Path:
@@ -25,9 +68,24 @@ def default_path() -> Path:
     Returns
     -------
     Path
-        $TOWATLAS_FILE, else build/atlas.nc.
+        $TOWATLAS_FILE, else the atlas that was built, else the one that came with the package. The second where there
+        is neither.
+
+    Raises
+    ------
+    AtlasFileError
+        If $TOWATLAS_FILE is empty.
+    FileNotFoundError
+        If there is no file where it points.
     """
-    return Path(os.environ.get("TOWATLAS_FILE", "build/atlas.nc"))
+    path = built_path()
+    if path.exists():
+        return path
+    if _named():
+        raise FileNotFoundError(
+            f"{VARIABLE} names {path}, where there is no file: unset it, or `towatlas build` puts an atlas there"
+        )
+    return SHIPPED if SHIPPED.exists() else path
 
 
 def _dataset(path: Path, data: bytes) -> "netCDF4.Dataset":
