@@ -49,6 +49,7 @@ bench: install  ## chart error against time, compare the ratios, update docs and
 	$(BIN)/python -m benchmarks.models
 	$(BIN)/python -m benchmarks
 	$(BIN)/python -m benchmarks.waiting
+	$(BIN)/python -m benchmarks.validation
 
 failures: install  ## map where methods fail, write the figure and the tables of docs/failures.md
 	$(BIN)/python -m benchmarks.failures

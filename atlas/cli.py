@@ -39,6 +39,7 @@ COMMANDS = (
     "build",
     "plot",
     "explore",
+    "export",
     "report",
     "info",
     "warmup",

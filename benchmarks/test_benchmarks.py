@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import (
+    after_jump,
     digits,
     drag,
     figures,
@@ -22,9 +23,11 @@ from benchmarks import (
     stability,
     targets,
     targets_drag,
+    validation,
     waiting,
 )
 from benchmarks.timing import LOST, Row
+from towatlas import answer_scene, read_scene
 from towatlas.limits import threshold_length
 
 
@@ -288,3 +291,29 @@ def test_targets_say_whether_they_are_reached():
     verdicts = [targets.Target("a", value, wanted).verdict for value, wanted in ((2.0, 1.0), (0.5, 1.0), (2.0, None))]
     assert verdicts == ["reached", "not reached", "watched"]
     assert all(target.value > 0.0 for target in targets.of_forward_shots(rows=64, segments=10))
+
+
+def test_a_scene_beside_the_chain():
+    """Extrapolation of second order leaves a tenth of what it changes at most, and all numbers are there."""
+    found = validation.compare("skop-fig5", 40)
+    assert [row.quantity for row in found] == ["fish from the axis", "its depth", "tow tension", "growth", "frequency"]
+    assert all(row.apart < 0.1 * row.change / row.size for row in found)
+    assert validation.table(found).count("skop-fig5") == 5
+
+
+def test_speeds_that_change_in_moordyn():
+    """A tenth of a turn, ever faster: all rows are there, and so is the angle that the speeds make."""
+    pytest.importorskip("moordyn", reason="moordyn is not installed: pip install '.[peers]'")
+    answer = answer_scene(read_scene("skop-fig3"), model="air", asked=("position",))
+    speeds = answer.scene.speed * np.linspace(1.0, 1.1, 20)
+    track = after_jump.march(answer, 10, 1e4, speeds)
+    np.testing.assert_allclose(track.turns, np.cumsum(speeds) / answer.scene.speed / after_jump.ROWS, rtol=1e-12)
+    assert np.isfinite([track.radius, track.depth, track.tension]).all()
+
+
+def test_growth_of_a_swing_is_its_exponent():
+    turns = np.arange(40 * after_jump.ROWS) / after_jump.ROWS
+    swing = 1.0 + 1e-3 * np.exp(0.15 * turns) * np.cos(2.0 * np.pi * 3.0 / 7.0 * turns)
+    track = after_jump.Track(turns, turns, turns, turns, swing)
+    # A straight line taken off three periods takes some of a growing swing, the same share of each.
+    assert after_jump.growth(track, 5, 30) == pytest.approx(0.15, rel=0.01)

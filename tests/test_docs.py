@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import towatlas
+from towatlas.cli import COMMANDS
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -48,6 +49,17 @@ def test_names_in_a_page_exist(page):
             if not hasattr(value, part):
                 importlib.import_module(f"{value.__name__}.{part}")
             value = getattr(value, part)
+
+
+def test_the_page_of_checks_is_whole():
+    """Every command that prints numbers of its own, and no test that is not there."""
+    text = (ROOT / "docs" / "validation.md").read_text()
+    column = " ".join(line.split("|")[2] for line in text.splitlines() if line.count("|") == 5)
+    named = {words.split()[0] for words in re.findall(r"`([^`]+)`", column)}
+    # Files as they are, figures of what the others say, the compiler.
+    assert set(COMMANDS) - named == {"info", "plot", "warmup"}
+    for file in re.findall(r"`(?:tests/)?(test_\w+\.py)`", text):
+        assert (ROOT / "tests" / file).exists(), file
 
 
 def test_every_target_of_make_is_listed():

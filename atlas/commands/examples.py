@@ -74,6 +74,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "towatlas explore --out explore.html",
         "towatlas explore --out explore.html search.toml",
     ),
+    "export": (
+        "towatlas export search.toml --moordyn run40       # then: python run40/drive.py 2",
+        'towatlas export skop-fig3 --moordyn inner --gamma 5.94 --model vacuum --branch "1 inner"',
+    ),
     "report": (
         "towatlas report",
         "towatlas report dtmb713 --out dtmb713.html",

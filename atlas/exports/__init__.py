@@ -1,0 +1,1 @@
+"""What hands a problem to other programs."""
