@@ -79,6 +79,16 @@ def counts(system, gamma, **fluid):
             (1, 3),
             "vacuum",
         ),
+        # On the way from the second to the vacuum a wide turn close by another curve.
+        (
+            43.966451649588045,
+            2.141538255486676,
+            (2.55, 2.7),
+            {"C": 0.06197835119510777, "C_f": 0.0012576135840303994},
+            (2.583726, 2.650111),
+            (1, 3),
+            "vacuum",
+        ),
         # A fold beyond the speeds that are easily looked at.
         (8.598213412228047, 632.2661936372043, (40, 60), {"C": 0.043740859791831455}, (54.426808,), (7,), "vacuum"),
     ],

@@ -195,9 +195,15 @@ def _warm_all(client: Any, spec: Spec) -> None:
     from distributed import wait
 
     client.wait_for_workers(1, timeout=GONE)
+    # Not by Client.run, which waits for ever for a worker that is killed in the meantime.
+    asked = {
+        client.submit(_processor, workers=[worker], allow_other_workers=True, pure=False): worker
+        for worker in client.nthreads()
+    }
     firsts: dict[str, str] = {}
-    for worker, kind in client.run(_processor, on_error="ignore").items():
-        firsts.setdefault(kind, worker)
+    for future in wait(list(asked), timeout=BACK).done:
+        if future.status == "finished":
+            firsts.setdefault(future.result(), asked[future])
     wait(
         [
             client.submit(warm, spec, workers=[worker], allow_other_workers=True, pure=False)

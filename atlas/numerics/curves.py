@@ -36,6 +36,9 @@ class Steps:
         Corrections up to which the next step may be longer, by the factor `growth`; >= 0.
     growth : float
         >= 1.
+    straight : float
+        Least cosine of the angle between the directions of a point and the next, below 1: where it is smaller the step
+        is halved, so that no step leads over to another curve, or back.
     corrections, points : int
         At most; >= 1.
     """
@@ -47,6 +50,7 @@ class Steps:
     bent: float = 0.25
     easy: int = 2
     growth: float = 1.6
+    straight: float = 0.0
     corrections: int = 6
     points: int = 200
 
@@ -201,12 +205,14 @@ def follow(equations: Equations, start: Array, tangent: Array, stop: Stop, steps
         if not len(i):
             break
         reached, jacobian, monitors, good, easy = _correct(equations, z[i], tangent[i], step[i], i, steps)
+        new = tangents(jacobian)
+        along = np.sum(new * tangent[i], axis=1)
+        new *= np.where(along < 0.0, -1.0, 1.0)[:, None]
+        good &= ~(np.abs(along) < steps.straight) | (step[i] == 0.0)
         step[i[~good]] *= 0.5
         active[i[~good & (step[i] < steps.shortest)]] = False
-        k = i[good]
+        k, new = i[good], new[good]
         z[k] = reached[good]
-        new = tangents(jacobian[good])
-        new *= np.where(np.sum(new * tangent[k], axis=1) < 0.0, -1.0, 1.0)[:, None]
         done = stop(z[k], new, monitors[good], k)
         complete[k] |= done
         for row, *entry in zip(k, z[k], new, monitors[good], strict=True):

@@ -11,12 +11,14 @@ from towatlas.scene.diagrams import to_starboard
 from towatlas.scene.jumps import SceneAnswer
 from towatlas.scene.models import solve_model, with_drag
 from towatlas.scene.verdicts import rate_unit
-from towatlas.solve.follower import Mode, followed
+from towatlas.solve.follower import Mode, Sample, followed
 from towatlas.solve.growth import WEAK
 
 # Looked at between these shares of the speed unless more is asked for, with so much of the patience for following the
 # shape, and for all of it.
 LOOKED, FOLLOWING, SHARE = (0.8, 1.25), 0.1, 0.2
+# Of log speed: the same speed.
+CLOSE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -84,8 +86,8 @@ def flutter_edges(answer: SceneAnswer, reach: float = 0.0) -> FlutterEdges:
 
     Notes
     -----
-    Growth is counted at speeds 1 % apart at most; a narrower window may be missed. What grows by less than 0.01 gamma
-    is no flutter. A fifth of the patience is used at most; what could not be had is said, and nothing is raised.
+    Growth is counted at speeds 1 % apart at most, from the scene's outwards until an edge is passed; a narrower window
+    may be missed. What grows by less than 0.01 gamma is no flutter. A fifth of the patience is used at most; what could not be had is said, and nothing is raised.
 
     Examples
     --------
@@ -112,7 +114,8 @@ def _edges(answer: SceneAnswer, model: str, low: float, high: float) -> FlutterE
     traced, follower = followed(system, low * gamma, high * gamma, at=gamma)
     t = -np.log(low)
     with at_most(FOLLOWING / SHARE):
-        samples, began, ended = follower.through(traced, t, float(np.log(shapes.r_f[shapes.expected] * gamma**2)))
+        x = float(np.log(shapes.r_f[shapes.expected] * gamma**2))
+        samples, began, ended = follower.through(traced, t, x, _decided)
     first, last = samples[0].t, samples[-1].t
     spans = _merged(follower.modes(samples, began, ended))
     unit = scene.speed_of(1.0)
@@ -123,7 +126,11 @@ def _edges(answer: SceneAnswer, model: str, low: float, high: float) -> FlutterE
 
     below = [(at, rate, at is not span[0]) for span in spans for at, rate in _solved(span) if at <= t]
     above = [(at, rate, at is span[0]) for span in spans for at, rate in _solved(span) if at > t]
-    whole = began is not None or first <= 0.0, ended is not None or last >= np.log(high / low) * (1.0 - 1e-12)
+    end = float(np.log(high / low)) * (1.0 - 1e-12)
+    whole = (
+        began is not None or first <= 0.0 or _decided([one for one in samples[::-1] if one.t <= t + CLOSE]),
+        ended is not None or last >= end or _decided([one for one in samples if one.t >= t - CLOSE]),
+    )
     counted = all(sample.spectrum.status == status.OK for sample in samples)
     reason = "" if all(whole) else "the patience was used up"
     if not counted:
@@ -138,6 +145,14 @@ def _edges(answer: SceneAnswer, model: str, low: float, high: float) -> FlutterE
         complete=traced.certain and all(whole) and counted,
         failure=reason,
     )
+
+
+def _decided(samples: list[Sample]) -> bool:
+    """Whether samples from the shape outwards reach beyond the first edge: there are both such as flutter and such as
+    do not, and what grows at the last may not prove to be weak further on."""
+    growing = [sample.spectrum.growing.real for sample in samples]
+    strong = [bool((rates >= WEAK).any()) for rates in growing]
+    return any(strong) and not all(map(len, growing)) and bool((growing[-1] >= WEAK).all())
 
 
 Span = tuple[float, float, dict[float, float]]

@@ -1,6 +1,6 @@
 """The modes of motion of shapes, followed along every branch as speed or length moves, and where they begin to grow."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -127,8 +127,11 @@ class Follower:
                 done += 1
             yield samples, *_folds(traced, places)
 
-    def through(self, traced: Trace, t: float, x: float) -> tuple[list[Sample], Fold | None, Fold | None]:
-        """The same of the branch that passes a shape, from it outwards as far as the time allows; else samples end."""
+    def through(
+        self, traced: Trace, t: float, x: float, enough: Callable[[list[Sample]], bool]
+    ) -> tuple[list[Sample], Fold | None, Fold | None]:
+        """The same of the branch that passes a shape: from it outwards, each way until there are enough samples, in
+        the order of their distance, or the time is used up."""
         columns = traced.columns
         i = int(np.argmin([abs(column.t - t) for column in columns]))
         k = int(np.argmin(np.abs(columns[i].x - x)))
@@ -136,6 +139,9 @@ class Follower:
         order = sorted(range(len(places)), key=lambda j: abs(columns[places[j][0]].t - t))
         samples: dict[int, Sample] = {}
         for j in order:
+            way = [samples[m] for m in samples if (m - order[0]) * (j - order[0]) >= 0]
+            if way and enough(way):
+                continue
             try:
                 check_patience("growth rates along the branch", REMEDY, done=len(samples), of=len(places))
                 at, place = places[j]
