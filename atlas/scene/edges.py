@@ -87,7 +87,8 @@ def flutter_edges(answer: SceneAnswer, reach: float = 0.0) -> FlutterEdges:
     Notes
     -----
     Growth is counted at speeds 1 % apart at most, from the scene's outwards until an edge is passed; a narrower window
-    may be missed. What grows by less than 0.01 gamma is no flutter. A fifth of the patience is used at most; what could not be had is said, and nothing is raised.
+    may be missed. What grows by less than 0.01 gamma is no flutter. A fifth of the patience is used at most; what could
+    not be had is said, and nothing is raised.
 
     Examples
     --------
