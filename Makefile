@@ -75,6 +75,10 @@ figures: install  ## draw the figures of the README from build/atlas.nc, and the
 	$(BIN)/python -m towatlas plot device --out docs/device.svg
 	$(BIN)/python -m towatlas diagram --lam 10 --wf 1 --C 0.03 --gamma 0.2:2 --patience 300 --out docs/diagram.svg
 	$(BIN)/python -m towatlas explore --patience 600 --out docs/explore.html
+	sed -n '/^# chain.toml/,/^```/{/^```/!p}' docs/tutorial.md >build/chain.toml
+	$(BIN)/python -m towatlas scene build/chain.toml --out docs/tutorial-shapes.png
+	$(BIN)/python -m towatlas diagram build/chain.toml --speed 0.25:0.45 --out docs/tutorial-jump.svg >build/jump.csv
+	$(BIN)/python -m benchmarks.notebooks
 
 clean:  ## remove .venv, build and caches
 	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
