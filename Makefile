@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 ATLAS := build/atlas.nc
 
 .DEFAULT_GOAL := help
-.PHONY: help install atlas dist seeds equilibria drag stability test bench failures types check figures clean
+.PHONY: help install atlas dist seeds equilibria drag stability test docs bench failures types check figures clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
@@ -43,6 +43,16 @@ stability: install  ## build build/stability.nc, an atlas with growth rates in i
 
 test: install  ## run the tests, on two cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+# Once, so that the site is built offline after that.
+$(VENV)/docs-installed: $(VENV)/installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
+docs: $(VENV)/docs-installed  ## build the site, build/site; a warning or a link that leads nowhere is an error
+	@rm -rf build/site
+	$(BIN)/python -m sphinx -q -W --keep-going -E -d build/doctrees docs build/site
+	$(BIN)/python -m benchmarks.links build/site
 
 bench: install  ## chart error against time, compare the ratios, update docs and README
 	-$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[peers]'

@@ -14,12 +14,13 @@ from pathlib import Path
 import pytest
 
 import towatlas
+from benchmarks.links import complaints
 from benchmarks.notebooks import NOTEBOOKS, run
 from towatlas.cli import COMMANDS, _parser
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
-
+NAMES = [str(path.relative_to(ROOT)) for path in PAGES]
 
 RUNNERS = {
     "python": [sys.executable],
@@ -45,7 +46,6 @@ def blocks_of(page):
     return blocks
 
 
-NAMES = [str(path.relative_to(ROOT)) for path in PAGES]
 TO_RUN = [
     (page, languages)
     for page in NAMES
@@ -159,6 +159,24 @@ def test_every_public_name_is_in_the_api():
     text = "".join(path.read_text() for path in (ROOT / "docs" / "api").glob("*.rst"))
     listed = re.findall(r"^\.\. auto(?:function|class):: (\w+)$", text, re.M)
     assert sorted(listed) == sorted([*towatlas.__all__, *towatlas.device.__all__])
+
+
+def test_a_site_with_a_link_that_leads_nowhere_is_found_out(tmp_path):
+    (tmp_path / "other.html").write_text('<h1 id="here"><a href="index.html">back</a></h1>')
+    (tmp_path / "index.html").write_text('<a href="other.html#here"></a><a href="https://x.org"></a><img src="data:,">')
+    assert complaints(tmp_path) == []
+    (tmp_path / "index.html").write_text(
+        '<a href="none.html"></a><a href="other.html#there"></a><script src="https://x.org/a.js"></script>'
+        '<link href="//x.org/a.css">'
+    )
+    (tmp_path / "a.css").write_text("@font-face { src: url('https://x.org/font') }")
+    assert complaints(tmp_path) == [
+        "index.html: loads https://x.org/a.js",
+        "index.html: loads //x.org/a.css",
+        "index.html: no file none.html",
+        "index.html: no place other.html#there",
+        "a.css: loads something",
+    ]
 
 
 @pytest.mark.parametrize("page", NAMES)
