@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 ATLAS := build/atlas.nc
 
 .DEFAULT_GOAL := help
-.PHONY: help install atlas dist seeds equilibria drag stability test bench failures types check figures clean
+.PHONY: help install atlas dist seeds equilibria drag stability test docs bench failures types check figures clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
@@ -44,6 +44,16 @@ stability: install  ## build build/stability.nc, an atlas with growth rates in i
 test: install  ## run the tests, on two cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
+# Once, so that the site is built offline after that.
+$(VENV)/docs-installed: $(VENV)/installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
+docs: $(VENV)/docs-installed  ## build the site, build/site; a warning or a link that leads nowhere is an error
+	@rm -rf build/site
+	$(BIN)/python -m sphinx -q -W --keep-going -E -d build/doctrees docs build/site
+	$(BIN)/python -m benchmarks.links build/site
+
 bench: install  ## chart error against time, compare the ratios, update docs and README
 	-$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[peers]'
 	$(BIN)/python -m benchmarks.models
@@ -75,6 +85,10 @@ figures: install  ## draw the figures of the README from build/atlas.nc, and the
 	$(BIN)/python -m towatlas plot device --out docs/device.svg
 	$(BIN)/python -m towatlas diagram --lam 10 --wf 1 --C 0.03 --gamma 0.2:2 --patience 300 --out docs/diagram.svg
 	$(BIN)/python -m towatlas explore --patience 600 --out docs/explore.html
+	sed -n '/^# chain.toml/,/^```/{/^```/!p}' docs/tutorial.md >build/chain.toml
+	$(BIN)/python -m towatlas scene build/chain.toml --out docs/tutorial-shapes.png
+	$(BIN)/python -m towatlas diagram build/chain.toml --speed 0.25:0.45 --out docs/tutorial-jump.svg >build/jump.csv
+	$(BIN)/python -m benchmarks.notebooks
 
 clean:  ## remove .venv, build and caches
 	rm -rf $(VENV) build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache

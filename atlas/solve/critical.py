@@ -112,7 +112,7 @@ def solve_critical(lam: ArrayLike, w_f: ArrayLike, n: ArrayLike = 1) -> Critical
     Notes
     -----
     A shot from the fish up with offset a at t = mu satisfies the boundary condition at the fish; the n-th zero of
-    q = dp/da on it is the n-th fold, of the cable gamma^2 = |p|, lambda = (t - mu)/|p|, w_f = mu/|p|. Two unknowns
+    q = dp/da on it is the n-th fold, of the cable ``gamma^2 = |p|, lambda = (t - mu)/|p|, w_f = mu/|p|``. Two unknowns
     (a, gamma) are found by Newton in the logarithms; there is exactly one such pair (docs/proofs.md, Theorem 5).
     Relative error of gamma: `error`, about 48 eps (1 + lambda / (lambda - lambda_cn)).
 

@@ -83,7 +83,7 @@ def shape(
     -----
     Every point is the end of a fish-up shot of its own: nothing is interpolated. Errors of x and z: rounding times the
     number of half waves, and next to a fold the error of the root; in a vacuum below 1e-11 of the largest of 1 and
-    |x_f| unless `error` says otherwise.
+    ``|x_f|`` unless `error` says otherwise.
 
     References
     ----------

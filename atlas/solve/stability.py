@@ -56,10 +56,10 @@ def stability(
     -----
     The motion is that of NRL Report 7048, Eqs. (12), (15b), linearised, seen from the turning tow point. Growth
     rates are zeros of the Evans function D(sigma) = det eta at the tow point of three solutions from the fish up. That
-    none is missed: without drag all that grow have |sigma| <= gamma (docs/proofs.md, Theorem 9), and the pairs,
+    none is missed: without drag all that grow have ``|sigma| <= gamma`` (docs/proofs.md, Theorem 9), and the pairs,
     quadruples and oscillations of negative energy add up to the number of directions in which the energy falls, in a
     vacuum the nodes and the zeros of dp/da along the shape (Theorem 7); with drag by the argument principle in
-    |sigma| < 3 gamma, which is not proved to hold all.
+    ``|sigma| < 3 gamma``, which is not proved to hold all.
 
     Examples
     --------
