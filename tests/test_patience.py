@@ -241,7 +241,8 @@ def test_a_design_of_metres_for_inches():
     scene = read_scene("skop-fig3")
     with pytest.raises(TooMuchWork, match=r"--depth 25000 m, .*tow.radius = 11/16 in makes lam = .*too many to search"):
         towatlas.design(scene, 25000.0, model="vacuum")
-    with patience(300.0):
+    # Enough to find the cables; which of them last is not known of all.
+    with patience(20.0):
         assert len(towatlas.design(scene, 25.0, model="vacuum").cables) == 7
 
 
