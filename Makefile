@@ -41,6 +41,8 @@ drag: install  ## build build/atlas.nc with the folds with drag in it; some minu
 stability: install  ## build build/stability.nc, an atlas with growth rates in it; some minutes
 	$(BIN)/python -m towatlas build --stability --out build/stability.nc
 
+# Two processes run tests side by side, and threads of BLAS would wait for each other.
+test: export OPENBLAS_NUM_THREADS = 1
 test: install  ## run the tests, on two cores
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 

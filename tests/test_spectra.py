@@ -82,3 +82,21 @@ def test_shapes_damped_faster_than_the_reach():
     assert (found.growth_status.values == status.OK).all()
     alone = towatlas.stability(5.0, 1.0, gamma[0], C=1000.0, w=0.5, m_f=1.5)
     assert alone.kind.tolist() == ["stable"]
+
+
+def test_blas_is_limited_while_anybody_needs_it():
+    """Two at once: the first who leaves takes nothing from the other, and afterwards all is as before."""
+    from threadpoolctl import ThreadpoolController
+
+    from towatlas.solve.galerkin import _one_blas_thread
+
+    def threads():
+        return [library["num_threads"] for library in ThreadpoolController().select(user_api="blas").info()]
+
+    with ThreadpoolController().limit(limits=2, user_api="blas"):
+        before = threads()
+        with _one_blas_thread:
+            with _one_blas_thread:
+                assert set(threads()) == {1}
+            assert set(threads()) == {1}
+        assert threads() == before

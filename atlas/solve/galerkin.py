@@ -7,6 +7,7 @@ sigma^2 M + sigma G + K, M is symmetric and positive definite, and so is K in a 
 index says.
 """
 
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -97,10 +98,36 @@ def modes(motion: Motion, refined: int = 0) -> Modes:
     degree, panel = DEGREE + 3 * refined, PANEL / 1.5**refined
     unknowns = 2 * (degree + 1) * int(_panel_of_step(motion, panel)[-1] + 1)
     check_foreseen(SECONDS_A_CUBE * unknowns**3, f"modes of {unknowns} unknowns", REMEDY)
-    # Matrices this small are no work for two: on busy cores the threads of BLAS would wait for each other, thirty times
-    # as long as one takes alone.
-    with _blas().limit(limits=1, user_api="blas"):
+    with _one_blas_thread:
         return _modes(motion, refined, degree, panel)
+
+
+class _OneBlasThread:
+    """BLAS on one thread while anybody is within. Matrices this small are no work for two: on busy cores its threads
+    would wait for each other, thirty times as long as one takes alone.
+
+    The limit is of the process, and to move it while another thread is in BLAS is not safe: the first who comes sets
+    it, and the last who leaves takes it back.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._within = threading.Lock(), 0
+        self._limit: Any = None
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if self._within == 0:
+                self._limit = _blas().limit(limits=1, user_api="blas")
+            self._within += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._within -= 1
+            if self._within == 0:
+                self._limit.restore_original_limits()
+
+
+_one_blas_thread = _OneBlasThread()
 
 
 @cache
