@@ -118,9 +118,10 @@ def scene_of(path: str, options: argparse.Namespace) -> Scene:
 
 
 def atlas_if_any(path: Path | None) -> Atlas | None:
-    """The atlas, or None where there is no such file; a damaged one is an error."""
-    path = path or default_path()
-    return open_atlas(path) if path.exists() else None
+    """The atlas; None where none is named and there is none, but one that is named or damaged is an error."""
+    if path is None and not default_path().exists():
+        return None
+    return open_atlas(path)
 
 
 def _run(options: argparse.Namespace) -> int:
