@@ -2,6 +2,7 @@
 
 import errno
 import fcntl
+import io
 import os
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from helpers import run
+from tqdm import tqdm
 
 import towatlas
 from towatlas.kernels import status
@@ -296,6 +298,42 @@ def test_who_may_go_on(small, tmp_path):
     plan.write_text(plan.read_text().replace('"kernel_sources_sha256": "', '"kernel_sources_sha256": "0'))
     with pytest.raises(ValueError, match="another version of towatlas"):
         build_map(spec, tmp_path / "map", resume=True)
+
+
+def test_other_sources_do_not_go_on(tmp_path, monkeypatch):
+    """What tiles follow from is hashed, what draws them is not."""
+    package = tmp_path / "package"
+    copytree(ROOT / "atlas", package)
+    monkeypatch.setattr("towatlas.maps.build.__file__", str(package / "maps" / "build.py"))
+    spec = make_spec(PLAIN)
+    build_map(spec, tmp_path / "map")
+    for name, goes_on in (("plot/map.py", True), ("solve/search.py", False), ("system.py", False)):
+        file = package / name
+        before = file.read_text()
+        file.write_text(before + "# other\n")
+        if goes_on:
+            build_map(spec, tmp_path / "map", resume=True)
+        else:
+            with pytest.raises(ValueError, match="another version of towatlas"):
+                build_map(spec, tmp_path / "map", resume=True)
+        file.write_text(before)
+
+
+def test_the_bar_of_a_map_that_goes_on(tmp_path, monkeypatch):
+    """It begins at what is there already."""
+    bars = []
+
+    def bar(total, unit, wanted):
+        bars.append((unit, tqdm(total=total, file=io.StringIO())))
+        return bars[-1][1]
+
+    monkeypatch.setattr("towatlas.maps.build.progress_bar", bar)
+    spec = make_spec(PLAIN | {"tile": 1})
+    build_map(spec, tmp_path / "map")
+    tile_path(tmp_path / "map", 1).unlink()
+    bars.clear()
+    build_map(spec, tmp_path / "map", resume=True)
+    assert [(unit, one.n, one.total) for unit, one in bars] == [("tile", 3, 3), ("system", 3, 3), ("tile", 1, 1)]
 
 
 @pytest.mark.slow

@@ -35,14 +35,14 @@ class Variable:
         Where there is nothing; of the type of its values.
     attributes : dict
         By the CF conventions.
-    folds : bool
-        Whether it is of folds: of all axes but the speed.
+    stage : str
+        Whose tiles hold it, of `stages`.
     """
 
     beyond: tuple[str, ...]
     fill: Any
     attributes: dict[str, Any]
-    folds: bool = False
+    stage: str = "shapes"
 
 
 def variables(spec: Spec) -> dict[str, Variable]:
@@ -78,10 +78,10 @@ def variables(spec: Spec) -> dict[str, Variable]:
         }
         for name, text in texts.items():
             fill = np.int8(0) if name == "fold_change" else np.nan
-            found[name] = Variable(FOLD, fill, {"long_name": text, "units": "1"}, folds=True)
+            found[name] = Variable(FOLD, fill, {"long_name": text, "units": "1"}, stage="folds")
         codes = {"long_name": "outcome of the search for folds"} | _flags(status.FLAG_MEANINGS)
-        found["folds"] = Variable(CABLE, np.int32(0), {"long_name": "number of folds", "units": "1"}, folds=True)
-        found["folds_status"] = Variable(CABLE, np.int8(status.OK), codes, folds=True)
+        found["folds"] = Variable(CABLE, np.int32(0), {"long_name": "number of folds", "units": "1"}, stage="folds")
+        found["folds_status"] = Variable(CABLE, np.int8(status.OK), codes, stage="folds")
     return found
 
 
@@ -202,8 +202,8 @@ def _cut(axes: tuple[Axis, ...], most: int) -> Tiles:
     return Tiles(axes, tuple(block))
 
 
-def stages(spec: Spec) -> tuple[int, int]:
-    """How many tiles there are of shapes, which are numbered first, and of folds.
+def stages(spec: Spec) -> dict[str, Tiles]:
+    """The tiles of a map, which are numbered in this order.
 
     Parameters
     ----------
@@ -211,6 +211,47 @@ def stages(spec: Spec) -> tuple[int, int]:
 
     Returns
     -------
-    (int, int)
+    dict of Tiles
+        Those there are of "shapes" and "folds".
     """
-    return len(state_tiles(spec)) * spec.states, len(fold_tiles(spec)) * ("folds" in spec.fields)
+    found = {"shapes": state_tiles(spec)} if spec.states else {}
+    return found | ({"folds": fold_tiles(spec)} if "folds" in spec.fields else {})
+
+
+def count_tiles(spec: Spec) -> int:
+    """How many tiles a map has.
+
+    Parameters
+    ----------
+    spec : Spec
+
+    Returns
+    -------
+    int
+    """
+    return sum(len(tiles) for tiles in stages(spec).values())
+
+
+def place_of(spec: Spec, number: int) -> tuple[str, Tiles, int]:
+    """Where a tile of a map stands.
+
+    Parameters
+    ----------
+    spec : Spec
+    number : int
+        From 0.
+
+    Returns
+    -------
+    stage : str
+        Of `stages`.
+    tiles : Tiles
+        Of that stage.
+    number : int
+        Among these.
+    """
+    for stage, tiles in stages(spec).items():
+        if number < len(tiles):
+            return stage, tiles, number
+        number -= len(tiles)
+    raise IndexError(number)

@@ -91,10 +91,11 @@ def warm(spec: Spec) -> None:
     ----------
     spec : Spec
     """
-    states, folds = stages(spec)
+    first = 0
     with limited_threads(1):
-        for number in [0] * (states > 0) + [states] * (folds > 0):
-            compute_tile(spec, number, slice(2))
+        for tiles in stages(spec).values():
+            compute_tile(spec, first, slice(2))
+            first += len(tiles)
 
 
 def run_tiles(
