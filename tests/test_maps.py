@@ -22,7 +22,8 @@ from towatlas.maps.build import build_map, estimate, refuse
 from towatlas.maps.layout import KINDS, fold_tiles, state_tiles
 from towatlas.maps.lookup import COMPUTED, EDGE, FOLD, OUTSIDE, UNKNOWN
 from towatlas.maps.runner import do_tile
-from towatlas.maps.spec import NAMES, RATIOS, make_spec, read_spec, shipped_specs
+from towatlas.maps.spec import make_spec, read_spec, shipped_specs
+from towatlas.maps.systems import NAMES, RATIOS
 from towatlas.maps.tiles import compute_tile, read_tile, tile_path, write_tile
 from towatlas.plot.map import plot_map
 

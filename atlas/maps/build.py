@@ -20,8 +20,9 @@ from towatlas.kernels import status
 from towatlas.kernels.native import source_hash
 from towatlas.maps.layout import count_tiles, place_of, stages
 from towatlas.maps.runner import run_tiles, warm
-from towatlas.maps.spec import MOST_SYSTEMS, Spec
+from towatlas.maps.spec import MOST_SYSTEMS
 from towatlas.maps.store import merge, whole_tile, write_store
+from towatlas.maps.systems import Spec
 from towatlas.maps.tiles import compute_tile
 from towatlas.tables.seal import AtlasFileError
 
@@ -29,6 +30,12 @@ from towatlas.tables.seal import AtlasFileError
 SAMPLED, NEIGHBOURS, ENOUGH = 12, 8, 5.0
 # Rooms of the package that compute tiles; figures, commands and the like may change between a start and --resume.
 ROOMS = ("", "maps", "numerics", "solve")
+# By stage: what has a status, and what there is of each shape or fold.
+CODES = {
+    "shapes": ("status", "nodes"),
+    "folds": ("folds_status", "fold_gamma"),
+    "checks": ("check_folds_status", "check_fold_gamma"),
+}
 # The store holds the numbers of the tiles once more.
 COPIES = 2
 
@@ -229,10 +236,10 @@ def _survey(folder: Path, spec: Spec, known: dict[int, _Known], progress: bool) 
                 missing.append(number)
                 continue
             columns, digest = found
-            shapes = place_of(spec, number)[0] == "shapes"
-            codes = columns["status" if shapes else "folds_status"]
-            width = columns["nodes" if shapes else "fold_gamma"].shape[1]
-            known[number] = _Known(digest, shapes, width, int((codes != status.OK).sum()))
+            stage = place_of(spec, number)[0]
+            code, each = CODES[stage]
+            failed = int((columns[code] != status.OK).sum())
+            known[number] = _Known(digest, stage == "shapes", columns[each].shape[1], failed)
     return missing
 
 

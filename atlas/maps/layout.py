@@ -1,6 +1,6 @@
 """How a map lies in files: its variables, and the tiles that its systems are cut into."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, prod
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.kernels import status
-from towatlas.maps.spec import FOLDS_AS_SYSTEMS, Axis, Spec
+from towatlas.maps.systems import NAMES, Axis, Spec
 from towatlas.nomenclature import EQUILIBRIUM
 from towatlas.solve.many import FIELDS as SHAPES
 from towatlas.solve.spectra import FIELDS as GROWTH
@@ -74,14 +74,27 @@ def variables(spec: Spec) -> dict[str, Variable]:
             "fold_gamma": "speed of a fold, at which the number of shapes changes by two",
             "fold_r_f": "distance of the fish from the axis over tow radius at a fold",
             "fold_change": "shapes above less shapes below the speed of a fold",
+            "fold_below": "shapes just below the speed of a fold",
             "fold_error": "estimated relative error of the speed of a fold",
         }
+        if "origin" in spec.fields:
+            texts["fold_n"] = (
+                "number of the fold of the vacuum that a fold is continued from, 0 for one that drag makes"
+            )
+        fills = {"fold_change": np.int8(0), "fold_below": np.int32(-1), "fold_n": np.int32(-1)}
         for name, text in texts.items():
-            fill = np.int8(0) if name == "fold_change" else np.nan
-            found[name] = Variable(FOLD, fill, {"long_name": text, "units": "1"}, stage="folds")
+            found[name] = Variable(FOLD, fills.get(name, np.nan), {"long_name": text, "units": "1"}, stage="folds")
         codes = {"long_name": "outcome of the search for folds"} | _flags(status.FLAG_MEANINGS)
         found["folds"] = Variable(CABLE, np.int32(0), {"long_name": "number of folds", "units": "1"}, stage="folds")
         found["folds_status"] = Variable(CABLE, np.int8(status.OK), codes, stage="folds")
+    if spec.checks:
+        of_folds = {name: variable for name, variable in found.items() if variable.stage == "folds"}
+        found |= {f"check_{name}": replace(variable, stage="checks") for name, variable in of_folds.items()}
+        for axis in spec.cable_axes:
+            about = {"long_name": f"{NAMES[axis.name]}, at random", "units": "1"}
+            found[f"check_{axis.name}"] = Variable(CABLE, np.nan, about, stage="checks")
+        text = "error of the logarithm of speeds interpolated; inf where folds are others, missing where none are told"
+        found["check_error"] = Variable(CABLE, np.nan, {"long_name": text, "units": "1"}, stage="checks")
     return found
 
 
@@ -189,7 +202,7 @@ def fold_tiles(spec: Spec) -> Tiles:
     -------
     Tiles
     """
-    return _cut(spec.cable_axes, max(1, spec.tile // FOLDS_AS_SYSTEMS))
+    return _cut(spec.cable_axes, spec.fold_tile)
 
 
 def _cut(axes: tuple[Axis, ...], most: int) -> Tiles:
@@ -212,10 +225,14 @@ def stages(spec: Spec) -> dict[str, Tiles]:
     Returns
     -------
     dict of Tiles
-        Those there are of "shapes" and "folds".
+        Those there are of "shapes", "folds" and "checks".
     """
     found = {"shapes": state_tiles(spec)} if spec.states else {}
-    return found | ({"folds": fold_tiles(spec)} if "folds" in spec.fields else {})
+    if "folds" in spec.fields:
+        found["folds"] = fold_tiles(spec)
+    if spec.checks:
+        found["checks"] = _cut((Axis("check", np.arange(float(spec.checks)), "listed"),), spec.fold_tile)
+    return found
 
 
 def count_tiles(spec: Spec) -> int:

@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from towatlas.builders.file import limited_threads
 from towatlas.maps.layout import stages
-from towatlas.maps.spec import Spec
+from towatlas.maps.systems import Spec
 from towatlas.maps.tiles import compute_tile, tile_path, write_tile
 
 # Memory of a worker, beyond which it is ended and started anew; a tile of 1000 systems takes a tenth of it.

@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from towatlas.builders.file import COMPRESSION, provenance
 from towatlas.cf import symbol_attributes
+from towatlas.maps.folds import check_errors
 from towatlas.maps.layout import Tiles, place_of, stages, variables
-from towatlas.maps.spec import NAMES, Spec
+from towatlas.maps.systems import NAMES, Spec
 from towatlas.maps.tiles import Columns, padded, read_tile, tile_path
 from towatlas.nomenclature import DRAG
 
@@ -94,11 +96,20 @@ def write_store(folder: Path, spec: Spec, widths: dict[str, int], digests: list[
             for name, column in found[0].items():
                 (column,) = padded([column], widths["shape" if stage == "shapes" else "fold"])
                 arrays[name][place] = column.reshape(*shape, *column.shape[1:])
+        if spec.checks:
+            arrays["check_error"][:] = _measured(spec, temporary)
+            for name, column in spec.check_points().items():
+                arrays[f"check_{name}"][:] = column
         path = store_path(folder)
         shutil.rmtree(path, ignore_errors=True)
         os.replace(temporary, path)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _measured(spec: Spec, path: Path) -> NDArray[np.float64]:
+    with xr.open_dataset(str(path), engine="zarr", chunks=None) as data:
+        return check_errors(spec, data)
 
 
 def _template(spec: Spec, widths: dict[str, int], digests: list[str], path: Path) -> None:

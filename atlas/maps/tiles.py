@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from towatlas.effort import SECONDS, patience
 from towatlas.kernels import status
 from towatlas.maps.layout import CURVES, KINDS, place_of, variables
-from towatlas.maps.spec import Spec
+from towatlas.maps.systems import Spec
 from towatlas.results import Equilibria
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.folds import folds_in_speed
@@ -42,7 +42,7 @@ def compute_tile(spec: Spec, number: int, part: slice = slice(None)) -> Columns:
     ----------
     spec : Spec
     number : int
-        From 0; shapes first, then folds.
+        From 0; shapes first, then folds, then checks of these.
     part : slice
         Which of its systems; all by default.
 
@@ -54,7 +54,10 @@ def compute_tile(spec: Spec, number: int, part: slice = slice(None)) -> Columns:
     stage, tiles, k = place_of(spec, number)
     at = tuple(indices[part] for indices in tiles.indices(k))
     with patience(inf, each=SECONDS):
-        return _guarded(stage, spec, spec.numbers(tiles.axes, at))
+        if stage != "checks":
+            return _guarded(stage, spec, spec.numbers(tiles.axes, at))
+        points = {name: column[at[0]] for name, column in spec.check_points().items()}
+        return {f"check_{name}": column for name, column in _guarded("folds", spec, spec.whole(points)).items()}
 
 
 def _guarded(stage: str, spec: Spec, numbers: Numbers) -> Columns:
@@ -179,13 +182,17 @@ def _system(numbers: Numbers, i: int) -> tuple[System, float]:
 def _folds(spec: Spec, numbers: Numbers) -> Columns:
     assert spec.span is not None
     low, high = sorted(spec.span, key=abs)
-    found = [folds_in_speed(_system(numbers, i)[0], low, high, named=False) for i in range(len(numbers["lam"]))]
+    named = "origin" in spec.fields
+    found = [folds_in_speed(_system(numbers, i)[0], low, high, named) for i in range(len(numbers["lam"]))]
     columns: dict[str, list[NDArray[Any]]] = {
         "fold_gamma": [one.gamma for one in found],
         "fold_r_f": [one.r_f for one in found],
         "fold_change": [(one.shapes_above - one.shapes_below).astype(np.int8) for one in found],
+        "fold_below": [one.shapes_below.astype(np.int32) for one in found],
         "fold_error": [one.error for one in found],
     }
+    if named:
+        columns["fold_n"] = [one.n.astype(np.int32) for one in found]
     return {name: np.concatenate(padded([one[None] for one in column], 1)) for name, column in columns.items()} | {
         "folds": np.array([len(one) for one in found], np.int32),
         "folds_status": np.array([status.OK if one.complete else status.NOT_COUNTED for one in found], np.int8),
