@@ -170,7 +170,7 @@ def of_shell(point, *more):
     return ("folds", *(f"--{name}={value!r}" for name, value in numbers.items()), *more)
 
 
-def test_shell(capsys, folder, known):
+def test_shell(capsys, folder, known, tmp_path):
     point = system(12.0, 2.0)
     code, out, said = run(capsys, *of_shell(point, "--gamma=0.5:4", "--json", "--atlas", folder))
     (row,) = json.loads(out)
@@ -184,6 +184,8 @@ def test_shell(capsys, folder, known):
     assert (code, "speeds 0.5 to 40 are not all in the map" in said) == (3, True)
     code, out, said = run(capsys, *of_shell(point, "--gamma=0.5:4", "--atlas", folder / "none"))
     assert (code, out, "no map at" in said) == (5, "", True)
+    code, out, said = run(capsys, "scene", "skop-fig3", "--atlas", tmp_path)
+    assert (code, out, "holds no finished map" in said) == (5, "", True)
 
 
 def test_scene(capsys, monkeypatch, folder):

@@ -455,7 +455,7 @@ def test_shell(capsys, tmp_path, fine):
     code, _, said = run(capsys, "map", file, "--dry-run")
     assert (code, "plain.toml: key axes.lma is unknown; do you mean lam?" in said) == (2, True)
     code, _, said = run(capsys, "map", tmp_path / "none", "--dry-run")
-    assert (code, "those that come with the package: air-tests, wet-survey" in said) == (5, True)
+    assert (code, "those that come with the package: air-tests, wet-folds, wet-survey" in said) == (5, True)
     code, out, _ = run(capsys, "map", fine, "--at", "lam=4.1,gamma=1.2")
     assert (code, out.count("computed"), "+-" in out) == (0, 3, True)
     code, out, said = run(capsys, "map", fine, "--at", "lam=40,gamma=1.25")

@@ -40,7 +40,7 @@ def shipped_specs() -> list[str]:
     Examples
     --------
     >>> shipped_specs()
-    ['air-tests', 'wet-survey']
+    ['air-tests', 'wet-folds', 'wet-survey']
     """
     return sorted(entry.name[:-5] for entry in resources.files(__package__).iterdir() if entry.name.endswith(".toml"))
 
