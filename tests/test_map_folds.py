@@ -77,7 +77,7 @@ def test_folds_are_those_solved_directly(known):
     off = SAFETY * data.check_error.values[np.isfinite(data.check_error.values)].max()
     rng = np.random.default_rng(11)
     told = 0
-    for C, lam in zip(10.0 * 2.0 ** rng.random(12), rng.uniform(1.8, 2.4, 12), strict=True):
+    for C, lam in zip(10.0 * 2.0 ** rng.random(8), rng.uniform(1.8, 2.4, 8), strict=True):
         try:
             found = known.folds(system(C, lam), *SPAN)
         except NotInMap:
@@ -93,7 +93,7 @@ def test_folds_are_those_solved_directly(known):
         cells = {"C": Cell.of(data.C.values, C, "log"), "lam": Cell.of(data.lam.values, lam, "linear")}
         assert (np.abs(seeds_of(data, cells).log_gamma - np.log(direct.gamma)) <= off).all()
         told += 1
-    assert 6 <= told < 12
+    assert told > 4
 
 
 def test_checks_are_points_between(known):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from towatlas.checks import check_broadcast, check_choice, check_real
+from towatlas.effort import patience
 from towatlas.kernels import status
 from towatlas.numerics.errormap import SAFETY
 from towatlas.system import System
@@ -124,7 +125,8 @@ class Map:
         """
         from towatlas.maps.folds import find_folds
 
-        return find_folds(self, system, slow, fast)
+        with patience():
+            return find_folds(self, system, slow, fast)
 
     def _check_inside(self, points: Array, axes: dict[str, Array]) -> None:
         for k, (name, values) in enumerate(axes.items()):
