@@ -97,6 +97,7 @@ def test_files_that_cannot_be_read(capsys, tmp_path, atlas_path):
         ("critical", "--lam", 3, "--wf", 0, "--atlas"),
         ("info",),
         ("plot", "critical", "--out", tmp_path / "f.png", "--atlas"),
+        ("scene", "skop-fig3", "--model", "vacuum", "--atlas"),
     ):
         code, out, err = run(capsys, *arguments, tmp_path / "absent.nc")
         assert (code, out) == (5, "")

@@ -187,8 +187,8 @@ def test_far_beyond_the_drag_of_the_report():
     assert answer.position[:2] == pytest.approx([turned.real, turned.imag], rel=1e-9)
 
 
-def test_shell(capsys, tmp_path):
-    arguments = ("scene", "skop-fig4", "--gamma", 4.77, "--atlas", tmp_path / "none.nc", "--asked", "nodes,tension")
+def test_shell(capsys):
+    arguments = ("scene", "skop-fig4", "--gamma", 4.77, "--asked", "nodes,tension")
     code, out, _ = run(capsys, *arguments, "--json")
     answer = json.loads(out)
     assert (code, answer["model"], answer["model_forced"], answer["asked"]) == (0, "air", False, ["nodes", "tension"])

@@ -2,6 +2,7 @@
 
 import errno
 import fcntl
+import io
 import os
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from helpers import run
+from tqdm import tqdm
 
 import towatlas
 from towatlas.kernels import status
@@ -20,7 +22,8 @@ from towatlas.maps.build import build_map, estimate, refuse
 from towatlas.maps.layout import KINDS, fold_tiles, state_tiles
 from towatlas.maps.lookup import COMPUTED, EDGE, FOLD, OUTSIDE, UNKNOWN
 from towatlas.maps.runner import do_tile
-from towatlas.maps.spec import NAMES, RATIOS, make_spec, read_spec, shipped_specs
+from towatlas.maps.spec import make_spec, read_spec, shipped_specs
+from towatlas.maps.systems import NAMES, RATIOS
 from towatlas.maps.tiles import compute_tile, read_tile, tile_path, write_tile
 from towatlas.plot.map import plot_map
 
@@ -298,6 +301,42 @@ def test_who_may_go_on(small, tmp_path):
         build_map(spec, tmp_path / "map", resume=True)
 
 
+def test_other_sources_do_not_go_on(tmp_path, monkeypatch):
+    """What tiles follow from is hashed, what draws them is not."""
+    package = tmp_path / "package"
+    copytree(ROOT / "atlas", package)
+    monkeypatch.setattr("towatlas.maps.build.__file__", str(package / "maps" / "build.py"))
+    spec = make_spec(PLAIN)
+    build_map(spec, tmp_path / "map")
+    for name, goes_on in (("plot/map.py", True), ("solve/search.py", False), ("system.py", False)):
+        file = package / name
+        before = file.read_text()
+        file.write_text(before + "# other\n")
+        if goes_on:
+            build_map(spec, tmp_path / "map", resume=True)
+        else:
+            with pytest.raises(ValueError, match="another version of towatlas"):
+                build_map(spec, tmp_path / "map", resume=True)
+        file.write_text(before)
+
+
+def test_the_bar_of_a_map_that_goes_on(tmp_path, monkeypatch):
+    """It begins at what is there already."""
+    bars = []
+
+    def bar(total, unit, wanted):
+        bars.append((unit, tqdm(total=total, file=io.StringIO())))
+        return bars[-1][1]
+
+    monkeypatch.setattr("towatlas.maps.build.progress_bar", bar)
+    spec = make_spec(PLAIN | {"tile": 1})
+    build_map(spec, tmp_path / "map")
+    tile_path(tmp_path / "map", 1).unlink()
+    bars.clear()
+    build_map(spec, tmp_path / "map", resume=True)
+    assert [(unit, one.n, one.total) for unit, one in bars] == [("tile", 3, 3), ("system", 3, 3), ("tile", 1, 1)]
+
+
 @pytest.mark.slow
 def test_killed_workers_and_programs_change_nothing(tmp_path):
     from benchmarks.maps_chaos import run as disturbed_and_alone
@@ -416,7 +455,7 @@ def test_shell(capsys, tmp_path, fine):
     code, _, said = run(capsys, "map", file, "--dry-run")
     assert (code, "plain.toml: key axes.lma is unknown; do you mean lam?" in said) == (2, True)
     code, _, said = run(capsys, "map", tmp_path / "none", "--dry-run")
-    assert (code, "those that come with the package: air-tests, wet-survey" in said) == (5, True)
+    assert (code, "those that come with the package: air-tests, wet-folds, wet-survey" in said) == (5, True)
     code, out, _ = run(capsys, "map", fine, "--at", "lam=4.1,gamma=1.2")
     assert (code, out.count("computed"), "+-" in out) == (0, 3, True)
     code, out, said = run(capsys, "map", fine, "--at", "lam=40,gamma=1.25")

@@ -303,8 +303,9 @@ def test_all_jumps_about_the_speed_are_listed(ask):
     assert sum(row["gamma"] < 30 for row in rows) == len(json.loads(out)["equilibria"]) // 2
 
 
-def test_without_an_atlas(capsys, tmp_path):
-    code, out, _ = run(capsys, "scene", "skop-fig4", "--json", "--model", "vacuum", "--atlas", tmp_path / "none.nc")
+def test_without_an_atlas(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr("towatlas.commands.scene.default_path", lambda: tmp_path / "none.nc")
+    code, out, _ = run(capsys, "scene", "skop-fig4", "--json", "--model", "vacuum")
     assert code == 0
     assert {row["source"] for row in json.loads(out)["critical_speeds"]} == {"solved"}
 

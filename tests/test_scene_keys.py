@@ -419,10 +419,10 @@ name = "{}"
         ),
     ],
 )
-def test_what_is_not_used_is_said(capsys, monkeypatch, tmp_path, fluid, model, left_out):
+def test_what_is_not_used_is_said(capsys, monkeypatch, fluid, model, left_out):
     """And a scene comes through a pipe."""
     monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(SHELL.format(fluid).encode())))
-    arguments = ("scene", "-", "--model", model, "--asked", "position", "--json", "--atlas", tmp_path / "none.nc")
+    arguments = ("scene", "-", "--model", model, "--asked", "position", "--json")
     code, out, err = run(capsys, *arguments)
     answer = json.loads(out)
     assert (code, answer["file"], answer["turn"], answer["cable"]) == (0, "-", "starboard", None)

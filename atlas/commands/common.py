@@ -156,12 +156,12 @@ def add_patience(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_atlas(parser: argparse.ArgumentParser) -> None:
+def add_atlas(parser: argparse.ArgumentParser, more: str = "") -> None:
     parser.add_argument(
         "--atlas",
         type=Path,
         metavar="FILE",
-        help="default: $TOWATLAS_FILE, else what `towatlas build` made, else the one that came with the package",
+        help="default: $TOWATLAS_FILE, else what `towatlas build` made, else the one that came with the package" + more,
     )
 
 

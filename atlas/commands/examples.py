@@ -17,6 +17,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     "folds": (
         "towatlas folds --lam 16 --wf 3 --gamma 1:6          # in a vacuum",
         "towatlas folds --lam 16 --wf 3 --C 5.6 --gamma 1:6  # in air",
+        "towatlas folds --lam 2.1 --wf 16 --w 0.5 --C 12 --gamma 0.1:5 --atlas short  # from a map of `towatlas map`",
     ),
     "equilibria": (
         "towatlas equilibria --lam 37.8 --wf 1352 --gamma 5.94",

@@ -2,12 +2,26 @@
 
 import argparse
 import math
+from pathlib import Path
 from typing import Any
 
-from towatlas.commands.common import FAILED, OK, add_cable, add_fluid, add_patience, fluid, print_json, real, say
+from towatlas.commands.common import (
+    FAILED,
+    OK,
+    OUTSIDE,
+    add_cable,
+    add_fluid,
+    add_patience,
+    fluid,
+    print_json,
+    real,
+    say,
+)
+from towatlas.effort import patience
 from towatlas.kernels import status
 from towatlas.results import Folds
-from towatlas.solve.folds import folds
+from towatlas.solve.folds import folds, name_folds
+from towatlas.system import System
 
 
 def add(commands: Any) -> None:
@@ -28,6 +42,12 @@ def add(commands: Any) -> None:
         help="from which speed to which, Omega sqrt(R/g); both negative for a turn to port, as --gamma=-5:-1",
     )
     add_fluid(parser)
+    parser.add_argument(
+        "--atlas",
+        type=Path,
+        metavar="DIR",
+        help="look them up in a map of folds, by `towatlas map`, and compute nothing",
+    )
     add_patience(parser)
     parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")
     parser.set_defaults(run=_run)
@@ -58,7 +78,19 @@ def span(text: str) -> tuple[float, float]:
 
 
 def _run(options: argparse.Namespace) -> int:
-    found = folds(options.lam, options.wf, options.gamma, **fluid(options))
+    if options.atlas is None:
+        found = folds(options.lam, options.wf, options.gamma, **fluid(options))
+    else:
+        from towatlas.maps.folds import NotInMap
+        from towatlas.maps.lookup import OutsideMap, open_map
+
+        system = System.of(options.lam, options.wf, **fluid(options))
+        try:
+            with patience():
+                found = name_folds(open_map(options.atlas).folds(system, *sorted(options.gamma, key=abs)))
+        except (OutsideMap, NotInMap) as error:
+            say(f"{error}; without --atlas they are computed")
+            return OUTSIDE
     rows = [row_of(found, k) for k in range(len(found))]
     print_json(rows) if options.json else print_folds(rows)
     say(f"looked at: {found.searched}")

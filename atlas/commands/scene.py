@@ -4,7 +4,7 @@ import argparse
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,16 +16,18 @@ from towatlas.commands.quantities import Range, quantity, range_of
 from towatlas.commands.scene_files import check_out, write_scene
 from towatlas.commands.scene_seen import as_object, lines_of
 from towatlas.kernels import status
+from towatlas.results import Folds
 from towatlas.scene.choice import Choice, percent
 from towatlas.scene.diagrams import SceneDiagram, scene_diagram
 from towatlas.scene.file import read_scene, scene_of_text, shipped_scenes
 from towatlas.scene.jumps import LOOKED, NEAR, Jumps, SceneAnswer, answer_scene
 from towatlas.scene.library import LARGEST
 from towatlas.scene.margins import margins_of
-from towatlas.scene.models import QUESTIONS, check_questions, with_drag
+from towatlas.scene.models import QUESTIONS, Finder, check_questions, solve_jumps, with_drag
 from towatlas.scene.scene import KNOT, MODELS, Scene
 from towatlas.scene.sensitivities import sensitivities_of
 from towatlas.scene.verdicts import verdicts_of
+from towatlas.system import System
 from towatlas.tables.atlas import Atlas, open_atlas
 from towatlas.tables.file import default_path
 
@@ -81,7 +83,7 @@ def add(commands: Any) -> None:
         metavar="LOW:HIGH",
         help="also what is seen as the speed rises from LOW to HIGH, as 1kn:8kn, and falls back; takes longer",
     )
-    add_atlas(parser)
+    add_atlas(parser, "; or DIR of a map of folds, in which jumps with drag are looked up")
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--json", action="store_true", help="one object instead of tables, with all of it")
     where.add_argument(
@@ -118,9 +120,34 @@ def scene_of(path: str, options: argparse.Namespace) -> Scene:
 
 
 def atlas_if_any(path: Path | None) -> Atlas | None:
-    """The atlas, or None where there is no such file; a damaged one is an error."""
-    path = path or default_path()
-    return open_atlas(path) if path.exists() else None
+    """The atlas; None where none is named and there is none, but one that is named or damaged is an error.
+
+    Where a map is named critical speeds are looked up in that of always.
+    """
+    if path is not None and path.is_dir():
+        path = None
+    if path is None and not default_path().exists():
+        return None
+    return open_atlas(path)
+
+
+def _finder(path: Path | None) -> Finder:
+    """What finds jumps with drag: a map, where one is named and tells them, else the solver."""
+    if path is None or not path.is_dir():
+        return solve_jumps
+    from towatlas.maps.folds import NotInMap
+    from towatlas.maps.lookup import OutsideMap, open_map
+
+    known = open_map(path)
+
+    def find(system: System, slow: float, fast: float) -> Folds:
+        try:
+            return known.folds(system, slow, fast)
+        except (OutsideMap, NotInMap) as error:
+            found = solve_jumps(system, slow, fast)
+            return replace(found, searched=f"{found.searched}; not looked up: {error}")
+
+    return find
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -133,7 +160,7 @@ def _run(options: argparse.Namespace) -> int:
     if asked is not None and "speeds" not in options.asked:
         raise ValueError("--margin is a distance from jumps, which are not looked for without --asked speeds")
     atlas = atlas_if_any(options.atlas)
-    answer = answer_scene(scene, atlas, options.model, options.asked, options.compare)
+    answer = answer_scene(scene, atlas, options.model, options.asked, options.compare, _finder(options.atlas))
     slopes = sensitivities_of(answer) if options.sensitivities else None
     found = margins_of(answer, slopes, 0.0 if asked is None else asked / scene.speed)
     lasting = verdicts_of(answer)
@@ -150,6 +177,8 @@ def _run(options: argparse.Namespace) -> int:
         print("\n".join([text_of(answer, options.compare), "", *table, *ending]))
     for note in answer.notes:
         say(note)
+    if answer.folds is not None and options.atlas is not None and options.atlas.is_dir():
+        say(f"jumps: {answer.folds.searched}")
     codes = {int(code) for code in answer.jumps.status} if answer.jumps is not None else set()
     for code in codes - {status.OK}:
         say(f"a critical speed could not be had: {status.SENTENCES[code]}")
@@ -298,6 +327,7 @@ def object_of(answer: SceneAnswer) -> dict[str, Any]:
         "jumps": None if answer.folds is None else _folds(answer),
         "jumps_looked_at": None if answer.folds is None else [speeds(scene, scene.gamma * share) for share in LOOKED],
         "jumps_complete": None if answer.folds is None else answer.folds.complete,
+        "jumps_searched": None if answer.folds is None else answer.folds.searched,
         "equilibria": _equilibria(answer),
         "searched": answer.equilibria.searched,
     }

@@ -1,14 +1,16 @@
 """A map from its spec: what is missing is computed, and all of it put together."""
 
 import fcntl
+import hashlib
 import json
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.util import find_spec
+from math import prod
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +18,24 @@ import numpy as np
 from towatlas.builders.file import limited_threads, progress_bar
 from towatlas.kernels import status
 from towatlas.kernels.native import source_hash
-from towatlas.maps.layout import fold_tiles, stages, state_tiles
+from towatlas.maps.layout import count_tiles, place_of, stages
 from towatlas.maps.runner import run_tiles, warm
-from towatlas.maps.spec import MOST_SYSTEMS, Spec
+from towatlas.maps.spec import MOST_SYSTEMS
 from towatlas.maps.store import merge, whole_tile, write_store
+from towatlas.maps.systems import Spec
 from towatlas.maps.tiles import compute_tile
 from towatlas.tables.seal import AtlasFileError
 
 # Of an estimate: tiles that are looked into, neighbouring systems of each, and CPU time after which no more are, s.
 SAMPLED, NEIGHBOURS, ENOUGH = 12, 8, 5.0
+# Rooms of the package that compute tiles; figures, commands and the like may change between a start and --resume.
+ROOMS = ("", "maps", "numerics", "solve")
+# By stage: what has a status, and what there is of each shape or fold.
+CODES = {
+    "shapes": ("status", "nodes"),
+    "folds": ("folds_status", "fold_gamma"),
+    "checks": ("check_folds_status", "check_fold_gamma"),
+}
 # The store holds the numbers of the tiles once more.
 COPIES = 2
 
@@ -80,17 +91,15 @@ def estimate(spec: Spec) -> Estimate:
     -------
     Estimate
     """
-    states, folds = stages(spec)
     seconds = size = 0.0
+    first = 0
     rng = np.random.default_rng(0)
     with limited_threads(1):
         warm(spec)
-        for first, count, tiles in ((0, states, state_tiles(spec)), (states, folds, fold_tiles(spec))):
-            if not count:
-                continue
+        for stage, tiles in stages(spec).items():
             began, looked, held = time.process_time(), 0, 0
-            some = NEIGHBOURS if first == 0 and states else 1
-            for k in rng.integers(count, size=SAMPLED):
+            some = NEIGHBOURS if stage == "shapes" else 1
+            for k in rng.integers(len(tiles), size=SAMPLED):
                 most = len(tiles.indices(int(k))[0]) - some
                 begin = int(rng.integers(max(0, most) + 1))
                 columns = compute_tile(spec, first + int(k), slice(begin, begin + some))
@@ -101,7 +110,8 @@ def estimate(spec: Spec) -> Estimate:
             share = float(np.prod([float(len(axis.values)) for axis in tiles.axes])) / looked
             seconds += share * (time.process_time() - began)
             size += share * held * COPIES
-    return Estimate(spec.systems, states + folds, seconds, size)
+            first += len(tiles)
+    return Estimate(spec.systems, first, seconds, size)
 
 
 def refuse(spec: Spec, expected: Estimate, folder: Path | None) -> None:
@@ -177,27 +187,29 @@ def build_map(
     with _locked(folder):
         _check_plan(spec, folder, resume)
         _remove_orphans(folder)
-        count = sum(stages(spec))
+        count = count_tiles(spec)
         known: dict[int, _Known] = {}
         # A tile that has been damaged since it was computed is computed again, once.
         for _ in range(2):
-            missing = _survey(folder, count, known)
+            missing = _survey(folder, spec, known, progress)
             if not missing:
                 break
             report(f"{len(missing):,} of {count:,} tiles to do")
-            with progress_bar(spec.systems, "system", progress) as bar:
+            todo = _systems(spec, missing)
+            with progress_bar(_systems(spec, range(count)), "system", progress) as bar:
+                bar.update(bar.total - todo)
                 run_tiles(folder, spec, missing, workers=workers, scheduler=scheduler, bar=bar)
-        if _survey(folder, count, known):
-            raise AtlasFileError(
-                f"tiles that were written cannot be read in {folder}: do the workers write into the same folder?"
-            )
-        states, _ = stages(spec)
-        widths = tuple(
-            max([1, *(one.width for number, one in known.items() if (number < states) == shapes)])
-            for shapes in (True, False)
-        )
+        else:
+            if _survey(folder, spec, known, progress):
+                raise AtlasFileError(
+                    f"tiles that were written cannot be read in {folder}: do the workers write into the same folder?"
+                )
+        widths = {
+            dim: max([1, *(one.width for one in known.values() if one.shapes == (dim == "shape"))])
+            for dim in ("shape", "fold")
+        }
         digests = [known[number].digest for number in range(count)]
-        write_store(folder, spec, (widths[0], widths[1]), digests)
+        write_store(folder, spec, widths, digests)
     if netcdf is not None:
         merge(folder, spec, netcdf)
     return sum(one.failed for one in known.values())
@@ -205,28 +217,36 @@ def build_map(
 
 @dataclass(frozen=True)
 class _Known:
-    """Of a tile that is there: its SHA-256, most shapes or folds, and how many of its systems have a status."""
+    """Of a tile that is there: its SHA-256, whether of shapes, most of these or of folds, systems with a status."""
 
     digest: str
+    shapes: bool
     width: int
     failed: int
 
 
-def _survey(folder: Path, count: int, known: dict[int, _Known]) -> list[int]:
+def _survey(folder: Path, spec: Spec, known: dict[int, _Known], progress: bool) -> list[int]:
     """The tiles that are missing; what is known of the others is added."""
     missing = []
-    for number in range(count):
-        if number in known:
-            continue
-        if (found := whole_tile(folder, number)) is None:
-            missing.append(number)
-            continue
-        columns, digest = found
-        shapes = "nodes" in columns
-        codes = columns["status" if shapes else "folds_status"]
-        width = columns["nodes" if shapes else "fold_gamma"].shape[1]
-        known[number] = _Known(digest, width, int((codes != status.OK).sum()))
+    unread = [number for number in range(count_tiles(spec)) if number not in known]
+    with progress_bar(len(unread), "tile", progress) as bar:
+        for number in unread:
+            bar.update()
+            if (found := whole_tile(folder, number)) is None:
+                missing.append(number)
+                continue
+            columns, digest = found
+            stage = place_of(spec, number)[0]
+            code, each = CODES[stage]
+            failed = int((columns[code] != status.OK).sum())
+            known[number] = _Known(digest, stage == "shapes", columns[each].shape[1], failed)
     return missing
+
+
+def _systems(spec: Spec, numbers: Iterable[int]) -> int:
+    """How many systems there are in some tiles."""
+    places = (place_of(spec, number) for number in numbers)
+    return sum(prod(part.stop - part.start for part in tiles.slices(k)) for _, tiles, k in places)
 
 
 def begun(folder: Path) -> bool:
@@ -261,7 +281,12 @@ def _locked(folder: Path) -> Iterator[None]:
 
 def _check_plan(spec: Spec, folder: Path, resume: bool) -> None:
     """The folder is new, or holds a part of the same map, computed by the same code."""
-    plan = {"spec_sha256": spec.sha256, "kernel_sources_sha256": source_hash(), "towatlas_version": version("towatlas")}
+    plan = {
+        "spec_sha256": spec.sha256,
+        "kernel_sources_sha256": source_hash(),
+        "package_sources_sha256": _package_hash(),
+        "towatlas_version": version("towatlas"),
+    }
     file = folder / "plan.json"
     if not begun(folder):
         if any(child.name not in ("lock", "plan.json.part") for child in folder.iterdir()):
@@ -277,6 +302,16 @@ def _check_plan(spec: Spec, folder: Path, resume: bool) -> None:
         raise ValueError(f"{folder} holds a map of another spec: name a new folder")
     if known != plan:
         raise ValueError(f"{folder} was begun with another version of towatlas, whose numbers may differ: begin anew")
+
+
+def _package_hash() -> str:
+    """SHA-256 of the files of the package, besides its kernels, that the numbers of a tile follow from."""
+    root = Path(__file__).parent.parent
+    files = [path for room in ROOMS for path in (root / room).iterdir() if path.suffix in (".py", ".npz")]
+    digest = hashlib.sha256()
+    for path in sorted(files):
+        digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return digest.hexdigest()
 
 
 def _remove_orphans(folder: Path) -> None:

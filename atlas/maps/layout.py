@@ -1,6 +1,6 @@
 """How a map lies in files: its variables, and the tiles that its systems are cut into."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, prod
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from towatlas.kernels import status
-from towatlas.maps.spec import FOLDS_AS_SYSTEMS, Axis, Spec
+from towatlas.maps.systems import NAMES, Axis, Spec
 from towatlas.nomenclature import EQUILIBRIUM
 from towatlas.solve.many import FIELDS as SHAPES
 from towatlas.solve.spectra import FIELDS as GROWTH
@@ -35,14 +35,14 @@ class Variable:
         Where there is nothing; of the type of its values.
     attributes : dict
         By the CF conventions.
-    folds : bool
-        Whether it is of folds: of all axes but the speed.
+    stage : str
+        Whose tiles hold it, of `stages`.
     """
 
     beyond: tuple[str, ...]
     fill: Any
     attributes: dict[str, Any]
-    folds: bool = False
+    stage: str = "shapes"
 
 
 def variables(spec: Spec) -> dict[str, Variable]:
@@ -74,14 +74,27 @@ def variables(spec: Spec) -> dict[str, Variable]:
             "fold_gamma": "speed of a fold, at which the number of shapes changes by two",
             "fold_r_f": "distance of the fish from the axis over tow radius at a fold",
             "fold_change": "shapes above less shapes below the speed of a fold",
+            "fold_below": "shapes just below the speed of a fold",
             "fold_error": "estimated relative error of the speed of a fold",
         }
+        if "origin" in spec.fields:
+            texts["fold_n"] = (
+                "number of the fold of the vacuum that a fold is continued from, 0 for one that drag makes"
+            )
+        fills = {"fold_change": np.int8(0), "fold_below": np.int32(-1), "fold_n": np.int32(-1)}
         for name, text in texts.items():
-            fill = np.int8(0) if name == "fold_change" else np.nan
-            found[name] = Variable(FOLD, fill, {"long_name": text, "units": "1"}, folds=True)
+            found[name] = Variable(FOLD, fills.get(name, np.nan), {"long_name": text, "units": "1"}, stage="folds")
         codes = {"long_name": "outcome of the search for folds"} | _flags(status.FLAG_MEANINGS)
-        found["folds"] = Variable(CABLE, np.int32(0), {"long_name": "number of folds", "units": "1"}, folds=True)
-        found["folds_status"] = Variable(CABLE, np.int8(status.OK), codes, folds=True)
+        found["folds"] = Variable(CABLE, np.int32(0), {"long_name": "number of folds", "units": "1"}, stage="folds")
+        found["folds_status"] = Variable(CABLE, np.int8(status.OK), codes, stage="folds")
+    if spec.checks:
+        of_folds = {name: variable for name, variable in found.items() if variable.stage == "folds"}
+        found |= {f"check_{name}": replace(variable, stage="checks") for name, variable in of_folds.items()}
+        for axis in spec.cable_axes:
+            about = {"long_name": f"{NAMES[axis.name]}, at random", "units": "1"}
+            found[f"check_{axis.name}"] = Variable(CABLE, np.nan, about, stage="checks")
+        text = "error of the logarithm of speeds interpolated; inf where folds are others, missing where none are told"
+        found["check_error"] = Variable(CABLE, np.nan, {"long_name": text, "units": "1"}, stage="checks")
     return found
 
 
@@ -189,7 +202,7 @@ def fold_tiles(spec: Spec) -> Tiles:
     -------
     Tiles
     """
-    return _cut(spec.cable_axes, max(1, spec.tile // FOLDS_AS_SYSTEMS))
+    return _cut(spec.cable_axes, spec.fold_tile)
 
 
 def _cut(axes: tuple[Axis, ...], most: int) -> Tiles:
@@ -202,8 +215,8 @@ def _cut(axes: tuple[Axis, ...], most: int) -> Tiles:
     return Tiles(axes, tuple(block))
 
 
-def stages(spec: Spec) -> tuple[int, int]:
-    """How many tiles there are of shapes, which are numbered first, and of folds.
+def stages(spec: Spec) -> dict[str, Tiles]:
+    """The tiles of a map, which are numbered in this order.
 
     Parameters
     ----------
@@ -211,6 +224,51 @@ def stages(spec: Spec) -> tuple[int, int]:
 
     Returns
     -------
-    (int, int)
+    dict of Tiles
+        Those there are of "shapes", "folds" and "checks".
     """
-    return len(state_tiles(spec)) * spec.states, len(fold_tiles(spec)) * ("folds" in spec.fields)
+    found = {"shapes": state_tiles(spec)} if spec.states else {}
+    if "folds" in spec.fields:
+        found["folds"] = fold_tiles(spec)
+    if spec.checks:
+        found["checks"] = _cut((Axis("check", np.arange(float(spec.checks)), "listed"),), spec.fold_tile)
+    return found
+
+
+def count_tiles(spec: Spec) -> int:
+    """How many tiles a map has.
+
+    Parameters
+    ----------
+    spec : Spec
+
+    Returns
+    -------
+    int
+    """
+    return sum(len(tiles) for tiles in stages(spec).values())
+
+
+def place_of(spec: Spec, number: int) -> tuple[str, Tiles, int]:
+    """Where a tile of a map stands.
+
+    Parameters
+    ----------
+    spec : Spec
+    number : int
+        From 0.
+
+    Returns
+    -------
+    stage : str
+        Of `stages`.
+    tiles : Tiles
+        Of that stage.
+    number : int
+        Among these.
+    """
+    for stage, tiles in stages(spec).items():
+        if number < len(tiles):
+            return stage, tiles, number
+        number -= len(tiles)
+    raise IndexError(number)

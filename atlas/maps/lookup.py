@@ -10,12 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from towatlas.checks import check_broadcast, check_choice, check_real
+from towatlas.effort import patience
 from towatlas.kernels import status
 from towatlas.numerics.errormap import SAFETY
+from towatlas.system import System
 from towatlas.tables.seal import AtlasFileError
 
 if TYPE_CHECKING:
     import xarray
+
+    from towatlas.results import Folds
 
 Array = NDArray[np.float64]
 COMPUTED, OUTSIDE, FOLD, EDGE, FAILED, UNKNOWN = range(6)
@@ -87,7 +91,7 @@ class Map:
         """
         check_choice("outside", outside, ("raise", "nan"))
         if "count" not in self.dataset:
-            raise ValueError("this map holds folds alone; read them from .dataset")
+            raise ValueError("this map holds folds alone: towatlas folds --atlas, .folds(...) or .dataset")
         axes = self.axes
         if wrong := sorted(set(numbers) ^ set(axes)):
             what = "is missing" if wrong[0] in axes else "is no axis of this map"
@@ -98,6 +102,31 @@ class Map:
             self._check_inside(points, axes)
         answers = [self._point(point, axes) for point in points]
         return self._dataset(points, axes, answers)
+
+    def folds(self, system: System, slow: float, fast: float) -> "Folds":
+        """Folds of a system between two speeds, where all points of the map around it have the same ones.
+
+        Parameters
+        ----------
+        system : System
+        slow, fast : float
+            Speeds Omega sqrt(R/g) [-], of one sign, the slower first.
+
+        Returns
+        -------
+        Folds
+            As of `towatlas.folds`, and as accurate: they are solved for from what is interpolated.
+
+        Raises
+        ------
+        ValueError
+            OutsideMap for a system or speeds outside the map, NotInMap where the points around have other folds; for
+            maps without folds and checks of them.
+        """
+        from towatlas.maps.folds import find_folds
+
+        with patience():
+            return find_folds(self, system, slow, fast)
 
     def _check_inside(self, points: Array, axes: dict[str, Array]) -> None:
         for k, (name, values) in enumerate(axes.items()):
@@ -112,10 +141,9 @@ class Map:
         shapes = self.dataset.sizes["shape"]
         cells = []
         for name, values, at in zip(axes, axes.values(), point, strict=True):
-            cell = _Cell.of(values, float(at), self.dataset[name].attrs.get("spacing") == "log")
-            if cell is None:
+            if not values[0] <= at <= values[-1]:
                 return {"status": np.full(shapes, OUTSIDE)}
-            cells.append(cell)
+            cells.append(Cell.of(values, float(at), self.dataset[name].attrs.get("spacing", "linear")))
         box = self.dataset.isel({name: cell.part for name, cell in zip(axes, cells, strict=True)})
         count, codes = box["count"].values, box["status"].values
         corners = list(product(*(cell.corners for cell in cells)))
@@ -174,11 +202,19 @@ class OutsideMap(ValueError):
 
 
 @dataclass(frozen=True)
-class _Cell:
+class Cell:
     """Along one axis: the points around a value, and those next to them.
 
-    `part` is where they are on the axis; of them `corners` are around the value, with `weights`, and `t` are their
-    coordinates.
+    Attributes
+    ----------
+    part : slice
+        Where they are on the axis.
+    corners : tuple of int
+        Which of them are around the value: two, or the one that it is.
+    weights : tuple of float
+        Of these.
+    t : ndarray, shape (points,)
+        Their coordinates.
     """
 
     part: slice
@@ -186,14 +222,33 @@ class _Cell:
     weights: tuple[float, ...]
     t: Array
 
+    @property
+    def around(self) -> slice:
+        """Where the corners are on the axis."""
+        return slice(self.part.start + self.corners[0], self.part.start + self.corners[-1] + 1)
+
     @classmethod
-    def of(cls, values: Array, at: float, log: bool) -> "_Cell | None":
-        if not values[0] <= at <= values[-1]:
-            return None
+    def of(cls, values: Array, at: float, spacing: str) -> "Cell":
+        """The cell of a value on an axis.
+
+        Parameters
+        ----------
+        values : ndarray, shape (points,)
+            Of the axis, rising.
+        at : float
+            Between the first and the last of them.
+        spacing : str
+            Of `Axis`.
+
+        Returns
+        -------
+        Cell
+        """
         k = int(np.searchsorted(values, at, side="right")) - 1
         if values[k] == at:
             return cls(slice(k, k + 1), (0,), (1.0,), np.zeros(1))
         first, last = max(0, k - 1), min(len(values), k + 3)
+        log = spacing == "log"
         t = np.log(values[first:last]) if log else values[first:last]
         low = k - first
         share = ((np.log(at) if log else at) - t[low]) / (t[low + 1] - t[low])
@@ -201,7 +256,7 @@ class _Cell:
 
 
 def _interpolate(
-    values: Array, same: NDArray[np.bool_], cells: list[_Cell], corners: list[tuple[int, ...]]
+    values: Array, same: NDArray[np.bool_], cells: list[Cell], corners: list[tuple[int, ...]]
 ) -> tuple[Array, Array]:
     """Values over the shapes, and errors, nan where they cannot be told."""
     weights = [float(np.prod(part)) for part in product(*(cell.weights for cell in cells))]
@@ -213,7 +268,7 @@ def _interpolate(
     return value, SAFETY * error
 
 
-def _left_out(values: Array, same: NDArray[np.bool_], cell: _Cell, axis: int, corners: list[tuple[int, ...]]) -> Array:
+def _left_out(values: Array, same: NDArray[np.bool_], cell: Cell, axis: int, corners: list[tuple[int, ...]]) -> Array:
     """How far a line between two points may be off, from the bend of three in a row that hold the cell."""
     low = cell.corners[0]
     worst = np.full(values.shape[-1], np.nan)

@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from towatlas.builders.file import limited_threads
 from towatlas.maps.layout import stages
-from towatlas.maps.spec import Spec
+from towatlas.maps.systems import Spec
 from towatlas.maps.tiles import compute_tile, tile_path, write_tile
 
 # Memory of a worker, beyond which it is ended and started anew; a tile of 1000 systems takes a tenth of it.
@@ -91,10 +91,11 @@ def warm(spec: Spec) -> None:
     ----------
     spec : Spec
     """
-    states, folds = stages(spec)
+    first = 0
     with limited_threads(1):
-        for number in [0] * (states > 0) + [states] * (folds > 0):
-            compute_tile(spec, number, slice(2))
+        for tiles in stages(spec).values():
+            compute_tile(spec, first, slice(2))
+            first += len(tiles)
 
 
 def run_tiles(

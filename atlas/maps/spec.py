@@ -1,41 +1,20 @@
-"""What a map is of: its axes, its fields, and the systems between; every key of its file checked."""
+"""What a map is of, as its file says; every key of it checked."""
 
 import difflib
-import hashlib
-import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib import resources
 from importlib.resources.abc import Traversable
-from math import inf, isfinite, prod
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from towatlas.checks import short
+from towatlas.maps.systems import NAMES, RATIOS, Axis, Spec
 from towatlas.scene.library import read_toml
 
-Array = NDArray[np.float64]
-
-# Names in full of what a system and its speed are made of; the last two take the place of m_f and C_t.
-NAMES = {
-    "lam": "cable length over tow radius",
-    "w_f": "fish weight over (mu + rho A) g R",
-    "gamma": "speed, Omega sqrt(R/g)",
-    "C": "drag constant of the cable",
-    "m_f": "fish mass over (mu + rho A) R",
-    "C_f": "drag constant of the fish",
-    "w": "weight of the cable, (mu - rho A) / (mu + rho A)",
-    "C_t": "tangential drag constant of the cable",
-    "C_s": "side force constant of the cable",
-    "b_s": "sine at which the side force is largest",
-    "m_f_over_w_f": "mass over weight of the fish",
-    "C_t_over_C": "tangential over normal drag constant of the cable",
-}
-RATIOS = {"m_f_over_w_f": ("m_f", "w_f"), "C_t_over_C": ("C_t", "C")}
-FIELDS = ("count", "nodes", "position", "tension", "growth", "kind", "shapes", "folds")
+FIELDS = ("count", "nodes", "position", "tension", "growth", "kind", "shapes", "folds", "origin")
 BRANCHES = ("all", "expected")
 SPACINGS = ("linear", "log")
 KEYS = {
@@ -44,118 +23,11 @@ KEYS = {
     "axes": tuple(NAMES),
     "axis": ("from", "to", "points", "spacing"),
     "shapes": ("points",),
-    "folds": ("from", "to"),
+    "folds": ("from", "to", "checks"),
 }
 # Values of an axis, systems of a tile, systems of a map: beyond, a machine would be busy for years.
 MOST_POINTS, MOST_IN_A_TILE, MOST_SYSTEMS = 10**6, 10**4, 10**10
-# A cable's folds take as long as so many systems.
-FOLDS_AS_SYSTEMS = 50
-
-
-@dataclass(frozen=True)
-class Axis:
-    """Values of one number.
-
-    Attributes
-    ----------
-    name : str
-        Of NAMES.
-    values : ndarray, shape (points,)
-        Rising [-].
-    spacing : str
-        "linear", "log" or "listed".
-    """
-
-    name: str
-    values: Array
-    spacing: str
-
-
-@dataclass(frozen=True)
-class Spec:
-    """What a map is of.
-
-    Attributes
-    ----------
-    title : str
-    fields : tuple of str
-        Of FIELDS.
-    branches : str
-        "all" or "expected".
-    tile : int
-        Systems of a tile, at most.
-    fixed : dict of float
-        Numbers that all systems share, by name [-].
-    axes : tuple of Axis
-        Neighbours follow each other along the last one.
-    stations : int
-        Points of a shape, of field shapes.
-    span : (float, float) or None
-        Speeds between which folds are looked for.
-    """
-
-    title: str
-    fields: tuple[str, ...]
-    branches: str
-    tile: int
-    fixed: dict[str, float]
-    axes: tuple[Axis, ...]
-    stations: int
-    span: tuple[float, float] | None
-
-    @property
-    def states(self) -> bool:
-        """Whether shapes are asked for, and not folds alone."""
-        return self.fields != ("folds",)
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Points of each axis."""
-        return tuple(len(axis.values) for axis in self.axes)
-
-    @property
-    def cable_axes(self) -> tuple[Axis, ...]:
-        """All axes but the speed."""
-        return tuple(axis for axis in self.axes if axis.name != "gamma")
-
-    @property
-    def systems(self) -> int:
-        """How many systems there are."""
-        return prod(self.shape)
-
-    @property
-    def growing(self) -> bool:
-        """Whether growth rates are asked for."""
-        return bool({"growth", "kind"} & set(self.fields))
-
-    def numbers(self, axes: tuple[Axis, ...], at: tuple[NDArray[np.int64], ...]) -> dict[str, Array]:
-        """Numbers of systems.
-
-        Parameters
-        ----------
-        axes : tuple of Axis
-        at : tuple of ndarray of int, shape (systems,)
-            Indices along each of them.
-
-        Returns
-        -------
-        dict of ndarray, shape (systems,)
-            By the names of `System`, and gamma if it is among them.
-        """
-        size = len(at[0]) if at else 1
-        found = {name: np.full(size, value) for name, value in self.fixed.items()}
-        found |= {axis.name: axis.values[k] for axis, k in zip(axes, at, strict=True)}
-        for ratio, (name, of) in RATIOS.items():
-            if ratio in found:
-                found[name] = found.pop(ratio) * found[of]
-        return found
-
-    @property
-    def sha256(self) -> str:
-        """Of all that the numbers of the map follow from."""
-        axes = [[axis.name, axis.spacing, axis.values.tolist()] for axis in self.axes]
-        rest = [self.fields, self.branches, self.tile, sorted(self.fixed.items()), self.stations, self.span]
-        return hashlib.sha256(json.dumps([axes, rest]).encode()).hexdigest()
+MOST_CHECKS = 10**5
 
 
 def shipped_specs() -> list[str]:
@@ -168,7 +40,7 @@ def shipped_specs() -> list[str]:
     Examples
     --------
     >>> shipped_specs()
-    ['air-tests', 'wet-survey']
+    ['air-tests', 'wet-folds', 'wet-survey']
     """
     return sorted(entry.name[:-5] for entry in resources.files(__package__).iterdir() if entry.name.endswith(".toml"))
 
@@ -258,7 +130,10 @@ def make_spec(table: Mapping[str, Any]) -> Spec:
         axes=axes,
         stations=_whole("shapes.points", sections["shapes"].get("points", 33), 1000, 2) if "shapes" in fields else 0,
         span=_span(fields, sections["folds"], axes, fixed),
+        checks=_whole("folds.checks", sections["folds"].get("checks", 0), MOST_CHECKS, 0),
     )
+    if "origin" in fields and "folds" not in fields:
+        raise ValueError('"origin" is that of folds: give the field "folds", too')
     if "shapes" not in fields and "shapes" in table:
         raise ValueError('[shapes] says how finely, but "shapes" is not among the fields')
     _check_whole(spec)
@@ -339,7 +214,7 @@ def _value(where: str, name: str, given: Any) -> float:
         raise ValueError(f"{where} = {value:g} must be positive")
     if name == "gamma" and value == 0.0:
         raise ValueError(f"{where} = 0: positive in a turn to starboard, negative in one to port")
-    if name in ("m_f", "C", "C_f", "C_t", "C_t_over_C") and value < 0.0:
+    if name in ("m_f", "C", "C_f", "C_t", "C_f_over_C", "C_t_over_C") and value < 0.0:
         raise ValueError(f"{where} = {value:g} is negative")
     if name == "w" and not -1.0 < value <= 1.0:
         raise ValueError(f"{where} = {value:g} must be above -1 and at most 1")
@@ -361,11 +236,11 @@ def _span(
             raise ValueError('[folds] says between which speeds, but "folds" is not among the fields')
         return None
     axis = next((axis for axis in axes if axis.name == "gamma"), None)
-    if fields == ("folds",) and (axis is not None or "gamma" in fixed):
+    if {*fields} <= {"folds", "origin"} and (axis is not None or "gamma" in fixed):
         raise ValueError("folds alone are of no one speed: give the range as [folds] from, to, and leave out gamma")
     ends = {"from": axis.values[0], "to": axis.values[-1]} if axis is not None else {}
-    ends |= {key: _value(f"folds.{key}", "gamma", value) for key, value in given.items()}
-    if missing := [key for key in KEYS["folds"] if key not in ends]:
+    ends |= {key: _value(f"folds.{key}", "gamma", given[key]) for key in ("from", "to") if key in given}
+    if missing := [key for key in ("from", "to") if key not in ends]:
         raise ValueError(f"folds.{missing[0]} is missing: between which speeds folds are looked for")
     low, high = float(ends["from"]), float(ends["to"])
     if not low < high or low * high < 0.0:
@@ -384,8 +259,9 @@ def _check_whole(spec: Spec) -> None:
     for ratio, (name, _) in RATIOS.items():
         if {ratio, name} <= known:
             raise ValueError(f"{ratio} and {name} say the same; leave out one")
-    if "C_t_over_C" in known and "C" not in known:
-        raise ValueError("C_t_over_C needs C, in [system] or [axes]")
+    for ratio in ("C_f_over_C", "C_t_over_C"):
+        if ratio in known and "C" not in known:
+            raise ValueError(f"{ratio} needs C, in [system] or [axes]")
     needed = ("lam", "w_f", "gamma") if spec.states else ("lam", "w_f")
     if missing := [name for name in needed if name not in known]:
         raise ValueError(f"{missing[0]} is missing; give it in [system] or in [axes]")

@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from towatlas.builders.file import COMPRESSION, provenance
 from towatlas.cf import symbol_attributes
-from towatlas.maps.layout import Tiles, fold_tiles, stages, state_tiles, variables
-from towatlas.maps.spec import NAMES, Spec
+from towatlas.maps.folds import check_errors
+from towatlas.maps.layout import Tiles, place_of, stages, variables
+from towatlas.maps.systems import NAMES, Spec
 from towatlas.maps.tiles import Columns, padded, read_tile, tile_path
 from towatlas.nomenclature import DRAG
 
@@ -60,15 +62,15 @@ def whole_tile(folder: Path, number: int) -> tuple[Columns, str] | None:
     return found
 
 
-def write_store(folder: Path, spec: Spec, widths: tuple[int, int], digests: list[str]) -> None:
+def write_store(folder: Path, spec: Spec, widths: dict[str, int], digests: list[str]) -> None:
     """Put the tiles of a map together, and the store into place: there is none, or a whole one.
 
     Parameters
     ----------
     folder : Path
     spec : Spec
-    widths : (int, int)
-        Most shapes of a system, and most folds of a cable.
+    widths : dict of int
+        Sizes of the dimensions "shape" and "fold".
     digests : list of str
         SHA-256 of the tiles, in order.
 
@@ -84,17 +86,20 @@ def write_store(folder: Path, spec: Spec, widths: tuple[int, int], digests: list
         _template(spec, widths, digests, temporary)
         group: Any = zarr.open_group(str(temporary), mode="r+")
         arrays = {name: group[name] for name in variables(spec)}
-        states, _ = stages(spec)
         for number, digest in enumerate(digests):
             found = read_tile(tile_path(folder, number))
             if found is None or found[1] != digest:
                 raise OSError(f"{tile_path(folder, number)} changed while it was read; --resume does it again")
-            tiles = state_tiles(spec) if number < states else fold_tiles(spec)
-            place = tiles.slices(number if number < states else number - states)
+            stage, tiles, k = place_of(spec, number)
+            place = tiles.slices(k)
             shape = tuple(part.stop - part.start for part in place)
             for name, column in found[0].items():
-                (column,) = padded([column], widths[0 if number < states else 1])
+                (column,) = padded([column], widths["shape" if stage == "shapes" else "fold"])
                 arrays[name][place] = column.reshape(*shape, *column.shape[1:])
+        if spec.checks:
+            arrays["check_error"][:] = _measured(spec, temporary)
+            for name, column in spec.check_points().items():
+                arrays[f"check_{name}"][:] = column
         path = store_path(folder)
         shutil.rmtree(path, ignore_errors=True)
         os.replace(temporary, path)
@@ -102,16 +107,21 @@ def write_store(folder: Path, spec: Spec, widths: tuple[int, int], digests: list
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _template(spec: Spec, widths: tuple[int, int], digests: list[str], path: Path) -> None:
+def _measured(spec: Spec, path: Path) -> NDArray[np.float64]:
+    with xr.open_dataset(str(path), engine="zarr", chunks=None) as data:
+        return check_errors(spec, data)
+
+
+def _template(spec: Spec, widths: dict[str, int], digests: list[str], path: Path) -> None:
     """All of the store but its chunks."""
     import dask.array
     import zarr
 
-    sizes = {"shape": widths[0], "fold": widths[1], "station": spec.stations}
+    sizes = widths | {"station": spec.stations}
     arrays: dict[str, Any] = {}
     encoding: dict[str, Any] = {}
     for name, variable in variables(spec).items():
-        tiles: Tiles = fold_tiles(spec) if variable.folds else state_tiles(spec)
+        tiles: Tiles = stages(spec)[variable.stage]
         beyond = tuple(sizes[dim] for dim in variable.beyond)
         shape = (*(len(axis.values) for axis in tiles.axes), *beyond)
         kind = np.asarray(variable.fill).dtype
@@ -188,8 +198,7 @@ def merge(folder: Path, spec: Spec, file: Path) -> None:
             )
             with netCDF4.Dataset(temporary, "a") as out:
                 for name, variable in variables(spec).items():
-                    tiles = fold_tiles(spec) if variable.folds else state_tiles(spec)
-                    _copy(out, whole[name].variable, name, tiles, variable.attributes)
+                    _copy(out, whole[name].variable, name, stages(spec)[variable.stage], variable.attributes)
         with temporary.open("rb+") as written:
             os.fsync(written.fileno())
         os.replace(temporary, file)

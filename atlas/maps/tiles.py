@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from towatlas.effort import SECONDS, patience
 from towatlas.kernels import status
-from towatlas.maps.layout import CURVES, KINDS, fold_tiles, stages, state_tiles, variables
-from towatlas.maps.spec import Spec
+from towatlas.maps.layout import CURVES, KINDS, place_of, variables
+from towatlas.maps.systems import Spec
 from towatlas.results import Equilibria
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.folds import folds_in_speed
@@ -42,7 +42,7 @@ def compute_tile(spec: Spec, number: int, part: slice = slice(None)) -> Columns:
     ----------
     spec : Spec
     number : int
-        From 0; shapes first, then folds.
+        From 0; shapes first, then folds, then checks of these.
     part : slice
         Which of its systems; all by default.
 
@@ -51,25 +51,24 @@ def compute_tile(spec: Spec, number: int, part: slice = slice(None)) -> Columns:
     dict of ndarray, shape (systems, ...)
         By the names of `layout.variables`. What fails has a status, and spoils no other.
     """
-    states, _ = stages(spec)
-    if number < states:
-        axes, tiles, solve = spec.axes, state_tiles(spec), _states
-    else:
-        axes, tiles, solve = spec.cable_axes, fold_tiles(spec), _folds
-    at = tuple(k[part] for k in tiles.indices(number if number < states else number - states))
+    stage, tiles, k = place_of(spec, number)
+    at = tuple(indices[part] for indices in tiles.indices(k))
     with patience(inf, each=SECONDS):
-        return _guarded(solve, spec, spec.numbers(axes, at))
+        if stage != "checks":
+            return _guarded(stage, spec, spec.numbers(tiles.axes, at))
+        points = {name: column[at[0]] for name, column in spec.check_points().items()}
+        return {f"check_{name}": column for name, column in _guarded("folds", spec, spec.whole(points)).items()}
 
 
-def _guarded(solve: Callable[[Spec, Numbers], Columns], spec: Spec, numbers: Numbers) -> Columns:
+def _guarded(stage: str, spec: Spec, numbers: Numbers) -> Columns:
     """Where something raises, halves of it, down to the one system that does."""
     size = len(numbers["lam"])
     try:
-        return solve(spec, numbers)
+        return SOLVERS[stage](spec, numbers)
     except (ArithmeticError, ValueError):
         if size == 1:
-            return _nothing(spec, solve is _folds)
-    halves = [_guarded(solve, spec, {name: part[s] for name, part in numbers.items()}) for s in _halves(size)]
+            return _nothing(spec, stage)
+    halves = [_guarded(stage, spec, {name: part[s] for name, part in numbers.items()}) for s in _halves(size)]
     return {name: np.concatenate(padded([half[name] for half in halves])) for name in halves[0]}
 
 
@@ -107,21 +106,21 @@ def _missing(array: NDArray[Any]) -> Any:
     return {"f": np.nan, "i": -1 if array.dtype == np.int32 else 0}[array.dtype.kind]
 
 
-def _nothing(spec: Spec, folds: bool) -> Columns:
+def _nothing(spec: Spec, stage: str) -> Columns:
     """Of one system that cannot be computed."""
     width = {"shape": 0, "fold": 0, "station": spec.stations}
     found = {
         name: np.full((1, *(width[dim] for dim in variable.beyond)), variable.fill)
         for name, variable in variables(spec).items()
-        if variable.folds == folds
+        if variable.stage == stage
     }
-    found["folds_status" if folds else "status"][:] = status.NOT_CONVERGED
+    found["status" if stage == "shapes" else "folds_status"][:] = status.NOT_CONVERGED
     return found
 
 
 def _states(spec: Spec, numbers: Numbers) -> Columns:
     found = (stability_many if spec.growing else equilibria_many)(**numbers)
-    wanted = [name for name, variable in variables(spec).items() if not variable.folds and name not in CURVES]
+    wanted = [name for name, variable in variables(spec).items() if variable.stage == "shapes" and name not in CURVES]
     columns = {name: found[name].values for name in wanted if name != "kind"}
     if spec.growing:
         codes = {kind: code for code, kind in enumerate(KINDS)} | {"": 0}
@@ -183,17 +182,24 @@ def _system(numbers: Numbers, i: int) -> tuple[System, float]:
 def _folds(spec: Spec, numbers: Numbers) -> Columns:
     assert spec.span is not None
     low, high = sorted(spec.span, key=abs)
-    found = [folds_in_speed(_system(numbers, i)[0], low, high, named=False) for i in range(len(numbers["lam"]))]
+    named = "origin" in spec.fields
+    found = [folds_in_speed(_system(numbers, i)[0], low, high, named) for i in range(len(numbers["lam"]))]
     columns: dict[str, list[NDArray[Any]]] = {
         "fold_gamma": [one.gamma for one in found],
         "fold_r_f": [one.r_f for one in found],
         "fold_change": [(one.shapes_above - one.shapes_below).astype(np.int8) for one in found],
+        "fold_below": [one.shapes_below.astype(np.int32) for one in found],
         "fold_error": [one.error for one in found],
     }
+    if named:
+        columns["fold_n"] = [one.n.astype(np.int32) for one in found]
     return {name: np.concatenate(padded([one[None] for one in column], 1)) for name, column in columns.items()} | {
         "folds": np.array([len(one) for one in found], np.int32),
         "folds_status": np.array([status.OK if one.complete else status.NOT_COUNTED for one in found], np.int8),
     }
+
+
+SOLVERS: dict[str, Callable[[Spec, Numbers], Columns]] = {"shapes": _states, "folds": _folds}
 
 
 def tile_path(folder: Path, number: int) -> Path:

@@ -13,7 +13,15 @@ import numpy as np
 from towatlas.effort import TooMuchWork
 from towatlas.kernels import status
 from towatlas.results import Folds
-from towatlas.scene.models import QUESTIONS, ModelAnswer, check_questions, solvable_models, solve_model
+from towatlas.scene.models import (
+    QUESTIONS,
+    Finder,
+    ModelAnswer,
+    check_questions,
+    solvable_models,
+    solve_jumps,
+    solve_model,
+)
 from towatlas.scene.scene import Scene, check_model
 
 
@@ -257,6 +265,7 @@ def least_model(
     asked: Sequence[str] = QUESTIONS,
     looked: tuple[float, float] | None = None,
     vacuum: Folds | None = None,
+    find: Finder = solve_jumps,
 ) -> Choice:
     """The least model whose answers to what is asked are those of all larger ones within the scene's tolerance.
 
@@ -272,6 +281,8 @@ def least_model(
         Speeds between which jumps are looked for [-]; without it none are.
     vacuum : Folds, optional
         Those of the vacuum model, if they are known.
+    find : callable
+        What finds jumps.
 
     Returns
     -------
@@ -295,7 +306,7 @@ def least_model(
     answers = []
     for name in known:
         try:
-            answers.append(_solved(scene, name, looked, vacuum, len(known) > 1))
+            answers.append(_solved(scene, name, looked, vacuum, find, len(known) > 1))
         except TooMuchWork as error:
             # A larger model may have fewer shapes, and shorter shots.
             if name == known[-1]:
@@ -349,10 +360,15 @@ def choose(
 
 
 def _solved(
-    scene: Scene, model: str, looked: tuple[float, float] | None, vacuum: Folds | None, compared: bool
+    scene: Scene,
+    model: str,
+    looked: tuple[float, float] | None,
+    vacuum: Folds | None,
+    find: Finder,
+    compared: bool,
 ) -> ModelAnswer:
     try:
-        return solve_model(scene, model, looked, vacuum)
+        return solve_model(scene, model, looked, vacuum, find)
     except TooMuchWork:
         raise
     except (ValueError, ArithmeticError) as error:

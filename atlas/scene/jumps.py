@@ -14,7 +14,7 @@ from towatlas.limits import transitions
 from towatlas.results import Equilibria, Folds
 from towatlas.scene.angles import Angles, angles_along, extrapolation
 from towatlas.scene.choice import Choice, least_model
-from towatlas.scene.models import QUESTIONS
+from towatlas.scene.models import QUESTIONS, Finder, solve_jumps
 from towatlas.scene.scene import Scene, patient_with
 from towatlas.scene.shapes import shape_in_si
 from towatlas.solve.critical import SECONDS_A_HALF_WAVE, solve_critical
@@ -222,6 +222,7 @@ def answer_scene(
     model: str | None = None,
     asked: Sequence[str] = QUESTIONS,
     compare: bool = False,
+    find: Finder = solve_jumps,
 ) -> SceneAnswer:
     """Jumps and equilibria of a scene, by the least model that answers what is asked.
 
@@ -237,6 +238,8 @@ def answer_scene(
         What it has to answer, some of "nodes", "position", "tension", "speeds".
     compare : bool
         Whether critical speeds by the vacuum model are wanted whatever the model used.
+    find : callable
+        What finds jumps with drag, (system, slow, fast) to Folds; by default they are solved for.
 
     Returns
     -------
@@ -259,13 +262,15 @@ def answer_scene(
     if not np.isfinite(scene.system("vacuum").lam):
         raise ValueError(f"{scene.source}: cable.length is missing; a design finds one: towatlas design --help")
     with patient_with(scene):
-        return _answer(scene, atlas, model, asked, compare)
+        return _answer(scene, atlas, model, asked, compare, find)
 
 
-def _answer(scene: Scene, atlas: Atlas | None, model: str | None, asked: Sequence[str], compare: bool) -> SceneAnswer:
+def _answer(
+    scene: Scene, atlas: Atlas | None, model: str | None, asked: Sequence[str], compare: bool, find: Finder
+) -> SceneAnswer:
     gamma = scene.gamma
     looked = (gamma * LOOKED[0], gamma * LOOKED[1])
-    choice = least_model(scene, model, asked, looked)
+    choice = least_model(scene, model, asked, looked, find=find)
     jumps = None
     if compare or choice.model == "vacuum":
         groups = scene.system("vacuum")

@@ -1,6 +1,6 @@
 """What the models of the report's Table 1 answer about a scene."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -16,6 +16,8 @@ from towatlas.system import System
 QUESTIONS = ("nodes", "position", "tension", "speeds")
 
 Array = NDArray[np.float64]
+# Folds of a system between two speeds, the slower first, named or not.
+Finder = Callable[[System, float, float], Folds]
 
 
 @dataclass(frozen=True)
@@ -37,8 +39,8 @@ class ModelAnswer:
     tension : float
         At the tow point [N], > 0.
     folds : Folds or None
-        Jumps between the speeds looked at, dimensionless; None where none were asked for. Where they come from is not
-        found out.
+        Jumps between the speeds looked at, dimensionless; None where none were asked for. Where they come from may
+        not be known.
     """
 
     model: str
@@ -135,8 +137,28 @@ def system_of(scene: Scene, model: str) -> System:
     return System.of(**asdict(scene.system(check_model(model))))
 
 
+def solve_jumps(system: System, slow: float, fast: float) -> Folds:
+    """Folds of a system between two speeds, solved for; where they come from is not found out.
+
+    Parameters
+    ----------
+    system : System
+    slow, fast : float
+        [-], of one sign, the slower first.
+
+    Returns
+    -------
+    Folds
+    """
+    return folds_in_speed(system, slow, fast, named=False)
+
+
 def solve_model(
-    scene: Scene, model: str, looked: tuple[float, float] | None = None, vacuum: Folds | None = None
+    scene: Scene,
+    model: str,
+    looked: tuple[float, float] | None = None,
+    vacuum: Folds | None = None,
+    find: Finder = solve_jumps,
 ) -> ModelAnswer:
     """What one model answers about a scene.
 
@@ -149,6 +171,8 @@ def solve_model(
         Speeds between which jumps are looked for [-]; without it none are.
     vacuum : Folds, optional
         Those of the vacuum model, if they are known.
+    find : callable
+        What finds the others.
 
     Returns
     -------
@@ -169,7 +193,7 @@ def solve_model(
     jumps = None
     if looked is not None:
         # A fluid without drag and buoyancy is a vacuum.
-        jumps = vacuum if system.in_vacuum and vacuum is not None else folds_in_speed(system, *looked, named=False)
+        jumps = vacuum if system.in_vacuum and vacuum is not None else find(system, *looked)
     return ModelAnswer(
         model=model,
         system=system,

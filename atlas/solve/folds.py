@@ -137,20 +137,32 @@ def name_folds(folds: Folds) -> Folds:
     Parameters
     ----------
     folds : Folds
-        From `folds_in_speed`.
+        From `folds_in_speed`; returned as they are where they are named.
 
     Returns
     -------
     Folds
     """
-    if folds.system.in_vacuum:
+    if folds.system.in_vacuum or (folds.origin != "").all():
         return folds
     x = np.log(folds.r_f * np.square(folds.gamma))
     n = numbers_of(x, np.tile(folds.system.row(), (len(x), 1)), folds.gamma, folds.system.w_f >= 0.0)
-    return replace(folds, n=n, origin=_origins(n))
+    return replace(folds, n=n, origin=origin_of(n))
 
 
-def _origins(n: Integers) -> NDArray[np.str_]:
+def origin_of(n: Integers) -> NDArray[np.str_]:
+    """Where folds come from.
+
+    Parameters
+    ----------
+    n : ndarray of int, shape (folds,)
+        From `numbers_of`.
+
+    Returns
+    -------
+    ndarray of str, shape (folds,)
+        "vacuum" or "drag".
+    """
     return np.where(n > 0, "vacuum", "drag").astype(np.str_)
 
 
@@ -202,7 +214,7 @@ def solve_folds_between(
         shapes_above=np.array([shapes[k + 1] for _, k in found], np.int64),
         n=n,
         # Not found out is neither.
-        origin=_origins(n) if named else np.full(len(n), ""),
+        origin=origin_of(n) if named else np.full(len(n), ""),
         error=np.array([fold.error for fold, _ in found]),
         status=np.full(len(t), status.OK, np.int8),
         complete=traced.certain,

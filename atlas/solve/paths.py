@@ -283,8 +283,21 @@ def _about_to(column: Column, step: float) -> bool:
     return bool(reaches.any() or folds.any())
 
 
-def _solve_folds(path: Path, x: Array, t: Array) -> tuple[Array, Array, Array, Booleans]:
-    """Folds near guesses: x, t, error of t, and whether they were found."""
+def solve_folds(path: Path, x: Array, t: Array) -> tuple[Array, Array, Array, Booleans]:
+    """Folds near guesses.
+
+    Parameters
+    ----------
+    path : Path
+    x, t : ndarray, shape (folds,)
+        log of the radius of the fish over g / Omega^2, and where on the path.
+
+    Returns
+    -------
+    x, t, error : ndarray, shape (folds,)
+        The error is that of t.
+    solved : ndarray of bool, shape (folds,)
+    """
     rate = np.full(len(x), np.nan)
 
     def residuals(z: Array, i: Integers) -> tuple[Array, Array, Booleans]:
@@ -312,7 +325,7 @@ def _meeting(path: Path, fewer: Column, more: Column) -> Fold | None:
     if not len(pairs):
         return None
     guess = 0.5 * (more.x[pairs] + more.x[pairs + 1])
-    x, t, error, solved = _solve_folds(path, guess, np.full(len(pairs), more.t))
+    x, t, error, solved = solve_folds(path, guess, np.full(len(pairs), more.t))
     gap = more.x[pairs + 1] - more.x[pairs]
     good = solved & (t >= low) & (t <= high) & (np.abs(x - guess) < gap)
     if good.sum() != 1:
