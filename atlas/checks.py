@@ -85,8 +85,8 @@ def check_real(name: str, value: Any, unit: str = "") -> NDArray[np.float64]:
     value = without_unit(name, value, unit)
     if hasattr(value, "iloc"):
         raise ValueError(
-            f"{name} is a pandas {type(value).__name__}; this function pairs by position and takes plain arrays: pass "
-            f"{name}.to_numpy(), or a Series to what returns one quantity, or one DataFrame to what returns many"
+            f"{name} is a pandas {type(value).__name__}; this function takes plain numbers here: pass "
+            f"{name}.to_numpy(), or to what answers of many cables Series, or one DataFrame with such columns"
         )
     if hasattr(value, "dims"):
         raise ValueError(

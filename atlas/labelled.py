@@ -120,7 +120,7 @@ def _plain(pandas: Any, name: str, series: Any) -> Any:
 
 
 def takes_frames(function: F) -> F:
-    """Let a function of arrays, whose result is a dataclass of arrays, take one DataFrame instead.
+    """Let a function of arrays, whose result is a dataclass of arrays or a Dataset, take a DataFrame or Series.
 
     Parameters
     ----------
@@ -129,10 +129,11 @@ def takes_frames(function: F) -> F:
     Returns
     -------
     callable
-        The same; of a DataFrame whose columns have the names of its arguments, a DataFrame with the same index. Other
-        columns are ignored; what a column says is not to be given beside it.
+        The same; of Series, aligned by their labels, or of a DataFrame whose columns have the names of its arguments, a
+        DataFrame with the same index. Other columns are ignored; what a column says is not to be given beside it.
     """
-    parameters = {name: one.default for name, one in signature(function).parameters.items() if name != "self"}
+    known = signature(function)
+    parameters = {name: one.default for name, one in known.parameters.items() if name != "self"}
     needed = [name for name, default in parameters.items() if default is Parameter.empty]
     columns = [name for name, default in parameters.items() if not isinstance(default, str)]
 
@@ -141,9 +142,12 @@ def takes_frames(function: F) -> F:
         pandas = sys.modules.get("pandas")
         at = next((k for k, value in enumerate(given[:2]) if pandas and isinstance(value, pandas.DataFrame)), None)
         if at is None:
-            return function(*given, **named)
+            if not any(pandas and isinstance(value, pandas.Series) for value in (*given, *named.values())):
+                return function(*given, **named)
+            index, values = without_index(known.bind(*given, **named).arguments)
+            return frame_of(function(**values), index)
         frame = given[at]
-        lacking = [name for name in needed if name not in frame]
+        lacking = [name for name in needed if name not in frame and name not in named]
         if lacking or given[at + 1 :] or any(name in columns and name in frame for name in named):
             others = [name for name in columns if name not in needed]
             wrong = f"it lacks {', '.join(lacking)}" if lacking else "something is given twice"
@@ -151,8 +155,8 @@ def takes_frames(function: F) -> F:
                 f"a DataFrame needs the columns {', '.join(needed)} and may have {', '.join(others)}; beside it go "
                 f"named arguments that are no columns: {wrong}"
             )
-        _, values = without_index({name: frame[name] for name in columns if name in frame})
-        return frame_of(function(*given[:at], **values, **named), frame.index)
+        _, values = without_index({name: frame[name] for name in columns if name in frame} | named)
+        return frame_of(function(*given[:at], **values), frame.index)
 
     return cast(F, either)
 
@@ -162,17 +166,24 @@ def frame_of(result: Any, index: Any = None) -> "pandas.DataFrame":
 
     Parameters
     ----------
-    result : dataclass
+    result : dataclass or Dataset over (system, shape)
     index : pandas.Index, optional
         By default the places in the arrays.
 
     Returns
     -------
     pandas.DataFrame
-        A row a point, a column a field.
+        A row a point, a column a field; of a Dataset a row a shape, its number behind the index, and one for a system
+        that has none.
     """
     import pandas
 
+    if hasattr(result, "data_vars"):
+        frame = result.to_dataframe()
+        frame = frame[frame.index.get_level_values("shape") < np.maximum(frame["count"], 1)]
+        row, shape_number = (frame.index.get_level_values(name) for name in ("system", "shape"))
+        levels = [index[row].get_level_values(k) for k in range(index.nlevels)]
+        return frame.set_index(pandas.MultiIndex.from_arrays([*levels, shape_number], names=[*index.names, "shape"]))
     columns = result.columns()
     shape = np.shape(next(iter(columns.values())))
     if index is None and len(shape) > 1:

@@ -377,8 +377,8 @@ class DragFolds(Answer):
         return codes.SENTENCES[int(column[index])]
 
 
-@dataclass(frozen=True)
-class GrowthRates:
+@dataclass(frozen=True, repr=False)
+class GrowthRates(Answer):
     """Growth rates of inner shapes in a vacuum, from an atlas; arrays of one shape, that of what was asked.
 
     Attributes
@@ -412,8 +412,8 @@ class GrowthRates:
     status: NDArray[np.int8]
 
 
-@dataclass(frozen=True)
-class FlutterSpeeds:
+@dataclass(frozen=True, repr=False)
+class FlutterSpeeds(Answer):
     """Speeds at which the inner shape of n nodes of one cable begins and ceases to flutter, from an atlas.
 
     Attributes
@@ -433,6 +433,8 @@ class FlutterSpeeds:
     status : int
         A code of `towatlas.kernels.status`; NOT_COUNTED where there may be others, as next to where a window opens.
     """
+
+    DIMENSION: ClassVar[str] = "edge"
 
     lam: float
     w_f: float

@@ -282,7 +282,7 @@ class Branch:
         return text
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Diagram:
     """All branches of shapes of one cable over its speed, or over its length.
 
@@ -309,6 +309,12 @@ class Diagram:
     branches: tuple[Branch, ...]
     complete: bool
     looked_at: str
+
+    def __repr__(self) -> str:
+        head = (
+            f"Diagram over {self.moved} {self.low:.6g} to {self.high:.6g}, {len(self.branches)} branches, {self.system}"
+        )
+        return "\n".join([head, *(f"  {branch}" for branch in self.branches)])
 
     def to_dataset(self) -> "xarray.Dataset":
         """The diagram as a dataset.

@@ -95,20 +95,20 @@ class Chain:
         stiffness = -self.h * difference.T @ sparse.kron(sparse.diags_array(tension), np.eye(3)) @ difference
         return stiffness.tocsr(), -self.h * constraint.T, constraint
 
+    def imbalance(self, r, tension):
+        """What is zero at rest, forces and |t|^2 / 2 less a half, and its slopes by positions and tensions; sparse."""
+        stretch = (dot(self.tangents(r), self.tangents(r)).ravel() - 1) / 2
+        residual = np.concatenate([(self.load(r, 0 * r) + self.pull(r, tension)).ravel(), stretch])
+        stiffness, by_tension, constraint = self.pull_slopes(r, tension)
+        return residual, sparse.block_array([[stiffness + self.load_slopes(r)[0], by_tension], [constraint, None]])
+
     def rest(self, shape):
         """Positions and tensions at rest, by Newton's method from a shape of the cable."""
         s = self.h * np.arange(1, self.links + 1)
         r = np.stack([np.interp(s, shape.s, shape[name]) for name in "xyz"], axis=-1)
         tension = np.interp(s - self.h / 2, shape.s, shape["T"])
         for _ in range(30):
-            residual = np.concatenate(
-                [
-                    (self.load(r, 0 * r) + self.pull(r, tension)).ravel(),
-                    (dot(self.tangents(r), self.tangents(r)).ravel() - 1) / 2,
-                ]
-            )
-            stiffness, by_tension, constraint = self.pull_slopes(r, tension)
-            matrix = sparse.block_array([[stiffness + self.load_slopes(r)[0], by_tension], [constraint, None]])
+            residual, matrix = self.imbalance(r, tension)
             step = _solve(matrix, -residual)
             r = r + step[: 3 * self.links].reshape(-1, 3)
             tension = tension + step[3 * self.links :]
@@ -116,6 +116,50 @@ class Chain:
             if size < 1e-10:
                 return r, tension
         raise ArithmeticError(f"the chain found no rest: last step {size:.1e}")
+
+    def fold(self, shape, gamma):
+        """Speed at which two shapes at rest meet, near a shape of the cable, from a guess of it.
+
+        Along the curve of shapes that coordinate which moves most is given and the speed is found, and the slope of the
+        speed in it is brought to zero by secants.
+        """
+        r, tension = self.rest(shape)
+        known = np.concatenate([r.ravel(), tension])
+        moves = _solve(self.imbalance(r, tension)[1], -self._by_speed(r))[: 3 * self.links]
+        given = int(np.argmax(np.abs(moves)))
+        slope, place = 1.0 / moves[given], known[given]
+        # As if the speed were a parabola in it.
+        following = place + 2.0 * (gamma - self.gamma) / slope
+        for _ in range(30):
+            known, rate = self._with_given(known, given, following)
+            curvature = (rate - slope) / (following - place)
+            slope, place, following = rate, following, following - rate / curvature
+            # What is left to the top of the parabola.
+            if abs(rate**2 / curvature) < 1e-12 * self.gamma:
+                return self.gamma
+        raise ArithmeticError(f"the chain found no fold: slope {slope:.1e}")
+
+    def _with_given(self, known, given, value):
+        """Positions and tensions of the shape with a coordinate of that value, and the slope of its speed in it."""
+        row = sparse.coo_array(([1.0], ([0], [given])), (1, len(known)))
+        for _ in range(30):
+            r, tension = known[: 3 * self.links].reshape(-1, 3), known[3 * self.links :]
+            residual, matrix = self.imbalance(r, tension)
+            bordered = sparse.block_array([[matrix, self._by_speed(r)[:, None]], [row, None]])
+            right = np.zeros((len(known) + 1, 2))
+            right[:-1, 0], right[-1] = -residual, (value - known[given], 1.0)
+            step, along = _solve(bordered, right).T
+            known, self.gamma = known + step[:-1], self.gamma + step[-1]
+            if max(np.abs(step[:-1]).max() / np.abs(known).max(), abs(step[-1]) / self.gamma) < 1e-12:
+                return known, along[-1]
+        raise ArithmeticError(f"the chain found no rest: last step {np.abs(step).max():.1e}")
+
+    def _by_speed(self, r):
+        """Derivative of the imbalance by the speed."""
+        speed, self.gamma = self.gamma, self.gamma + 1j * STEP
+        forces = self.load(r.astype(complex), 0 * r).imag / STEP
+        self.gamma = speed
+        return np.concatenate([forces.ravel(), np.zeros(self.links)])
 
     def eigenvalues(self, r, tension):
         """All of small motions about a shape at rest, the leading one first, and their modes, rows of 3N; dense.

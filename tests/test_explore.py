@@ -19,7 +19,7 @@ from towatlas.explorer.page import SCRIPTS, explorer_page, json_in_html
 from towatlas.explorer.tables import POINTS, STEPS, TOLD, table_of, told
 from towatlas.kernels import status
 from towatlas.scene.derived import FLUIDS
-from towatlas.scene.file import scene_of_text, shipped_scenes
+from towatlas.scene.file import read_scene, scene_of_text, shipped_scenes
 from towatlas.scene.keys import KEYS
 from towatlas.scene.library import find_type, shipped_types
 from towatlas.scene.units import parse_quantity
@@ -61,7 +61,7 @@ KNOWN = {
 
 def computed(expression, given=None):
     """Value of an expression in the scripts of the page that need no page, of `given` and `known`; nan for null."""
-    parts = [(resources.files("towatlas.explorer") / name).read_text() for name in SCRIPTS[:3]]
+    parts = [(resources.files("towatlas.explorer") / name).read_text() for name in SCRIPTS[:4]]
     about = json.dumps({"given": given, "known": KNOWN})
     ask = f"const {{ given, known }} = {about};\nconsole.log(JSON.stringify({expression}));"
     ran = subprocess.run([NODE, "-"], input="\n".join([*parts, ask]), capture_output=True, text=True, timeout=120)
@@ -141,6 +141,47 @@ def test_the_shape_drawn_is_that_of_the_package(system, branch):
     # Interpolated between 4001 points.
     assert np.abs(np.interp(at, curve.s, curve.x) - drawn[:, 0]).max() < 1e-4 * system[0]
     assert drawn[0, 2] == pytest.approx(float(curve["T"][0]), rel=1e-9)
+
+
+# Of jobs, which pause.
+VALUE = "((job) => { for (;;) { const part = job.next(); if (part.done) return part.value; } })"
+# Two real growth rates, a bare end, many nodes, two windows of one shape.
+KNOWN_SYSTEMS = [(10, 1352, 15.7598), (2.5, 0, 2.534), (20, 10, 2.0), (37.8, 1352, 5.94), (37.8, 1352, 12.0)]
+
+
+@in_node
+def test_what_lasts_is_what_the_package_says_or_not_told():
+    systems = [*KNOWN_SYSTEMS, *random_systems(60, seed=6)]
+    theirs = computed(
+        "given.map(([lam, wf, gamma]) => equilibria(lam, wf, gamma).filter((one) => one.n > 0 && !one.outer)"
+        f".map((one) => [one.name, one.n, {VALUE}(verdictOf(lam, wf, gamma, one))]))",
+        systems,
+    )
+    kinds = []
+    for (lam, w_f, gamma), found in zip(systems, theirs, strict=True):
+        if not found:
+            continue
+        ours = towatlas.stability(lam, w_f, gamma)
+        for name, nodes, verdict in found:
+            k = list(ours.equilibria.branch).index(name)
+            # With more D spans more than 16 digits on the circle: nothing is said rather than something wrong.
+            assert (verdict is None) == (nodes > 3), (lam, w_f, gamma, name)
+            if verdict is None:
+                continue
+            assert verdict["kind"] == ours.kind[k], (lam, w_f, gamma, name)
+            kinds.append(verdict["kind"])
+            if ours.growth[k] > 0.0:
+                # Zeros are polished to 1e-10 of s, which is -sigma^2.
+                apart = complex(verdict["growth"] - ours.growth[k], verdict["frequency"] - ours.frequency[k])
+                assert abs(apart) < 1e-8 * gamma
+    assert {"stable", "flutter", "divergence"} <= set(kinds)
+    assert len(kinds) > 30
+
+
+@in_node
+def test_a_shape_with_too_many_nodes_is_not_told():
+    cable = (69.41, 161.2, 4.0298)
+    assert computed(f"{VALUE}(verdictOf(...given, member(...given, 6)))", cable) is None
 
 
 @in_node
@@ -315,13 +356,22 @@ def test_nothing_embedded_ends_its_element(survey):
     assert json.loads(json_in_html("\u2028</SCRIPT>&")) == "\u2028</SCRIPT>&"
 
 
-def test_the_shipped_page_is_small_and_made_of_the_scripts_of_today():
+def test_the_shipped_page_is_small_and_made_of_the_parts_of_today():
+    """All of it but the numbers of its tables, which take a minute: scripts, frame, keys, units, scenes."""
     page = SHIPPED.read_text(encoding="utf-8")
     assert len(page.encode()) < 2e6
     for name in (*SCRIPTS, "page.css"):
         assert (resources.files("towatlas.explorer") / name).read_text(encoding="utf-8") in page, (
             f"make figures: {name}"
         )
+    embedded = re.search(r'id="known">(.*?)</script>', page, re.DOTALL)
+    assert embedded is not None
+    tables = json.loads(embedded[1])["tables"]
+    assert explorer_page(tables) == page, "make figures"
+    assert [table["name"] for table in tables] == list(shipped_scenes())
+    for table in tables:
+        scene = read_scene(table["name"])
+        assert table["scene"] == {name: getattr(scene, name) for name in table["scene"]}
 
 
 def test_bad_use_of_the_command_is_said(tmp_path, capsys):

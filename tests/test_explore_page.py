@@ -105,6 +105,51 @@ def test_numbers_on_show_are_those_of_the_package(page):
         assert words == len(ours)
 
 
+def test_windows_of_flutter_in_a_vacuum_are_those_of_the_package(page):
+    page.run("document.getElementById('no-drag').click()")
+    page.run(SETTLED)
+    scene = read_scene("skop-fig3")
+    groups, unit = scene.system("vacuum"), scene.speed / scene.gamma
+    low, high = 0.88 * scene.gamma, 1.7 * scene.gamma
+    ours = towatlas.flutter(groups.lam, groups.w_f, (low, high))
+    parts = "computed.parts.filter((one) => one.n && !one.outer)"
+    points = "one.points[0].speed, one.points[one.points.length - 1].speed"
+    theirs = page.run(f"{parts}.map((one) => [`${{one.n}} inner`, one.kind, {points}])")
+    grows = [part for part in theirs if part[1] != "stable" and part[3] > low * unit and part[2] < high * unit]
+    windows = [one for one in ours.windows if one.branch.endswith("inner")]
+    assert len(windows) > 3
+    assert [one.branch for one in windows] == [name for name, *_ in grows]
+    for window, (_, kind, begins, ceases) in zip(windows, grows, strict=True):
+        assert kind == ("weak" if window.weak else "flutter")
+        # Edges are halved to a thousandth.
+        assert (begins, ceases) == pytest.approx((window.low * unit, window.high * unit), rel=2e-3)
+    # As it is written, and as the shape at one speed is judged.
+    put(page, "m_s", 1.8)
+    page.run(SETTLED)
+    shape = page.run(
+        "(({ name, growth, frequency }) => ({ name, growth, frequency }))(shapesNow().find((one) => one.expected))"
+    )
+    known = towatlas.stability(groups.lam, groups.w_f, 1.8 / unit)
+    k, rate = list(known.equilibria.branch).index(shape["name"]), np.sqrt(scene.gravity / scene.radius)
+    assert shape["growth"] == pytest.approx(known.growth[k] * rate, rel=1e-6)
+    assert shape["frequency"] == pytest.approx(known.frequency[k] * rate / (2 * np.pi), rel=1e-6)
+    assert "flutters: swings grow" in say(page)
+    assert "flutters" in page.run("document.querySelector('#rising [aria-current]').textContent")
+    assert "lasts" in page.run("document.getElementById('then').textContent")
+
+
+def test_what_is_not_computed_is_said(page):
+    page.run("document.getElementById('no-drag').click()")
+    page.run("jobs.clear()")
+    put(page, "m_s", 8.0)
+    page.run(SETTLED.replace("jobs.size", "jobs.has('verdicts')"))
+    page.run("jobs.clear()")
+    assert page.run("shapesNow().find((one) => one.expected).nodes") > 4
+    assert "whether it flutters is not computed for this cable" in say(page)
+    rows = page.run("[...document.querySelectorAll('#rows tr')].map((row) => row.textContent)")
+    assert sum("not computed for this cable" in row for row in rows) >= 2
+
+
 def test_with_drag_it_says_what_the_diagram_says(page):
     table = page.run("(({ rising, low, high }) => ({ rising, low, high }))(known.tables[0])")
     assert page.run("withDrag()")

@@ -111,9 +111,14 @@ def test_series_that_do_not_fit_are_refused(atlas_file, labels):
     ):
         with pytest.raises(ValueError, match=match):
             atlas_file.critical_speed(*given)
-    for function in (atlas_file.states, towatlas.solve_critical, towatlas.equilibria_many):
-        with pytest.raises(ValueError, match="lam is a pandas Series; this function pairs by position"):
-            function(lam, *([1.0, 1.0] if function is towatlas.equilibria_many else [1.0]))
+    for function in (atlas_file.states, towatlas.solve_critical, towatlas.equilibria_many, towatlas.stability_many):
+        speed = [1.0] if function in (towatlas.equilibria_many, towatlas.stability_many) else []
+        with pytest.raises(ValueError, match="w_f has other labels"):
+            function(lam, w_f.iloc[:2], *speed)
+        with pytest.raises(ValueError, match=r"it lacks lam, w_f|w_f is a pandas DataFrame"):
+            function(1.0, w_f.to_frame(name="weight"), *speed)
+    with pytest.raises(ValueError, match="lam is a pandas Series"):
+        towatlas.equilibria(lam, 1.0, 1.0)
 
 
 def test_a_frame_for_a_whole_result(atlas_file, labels):
@@ -128,6 +133,40 @@ def test_a_frame_for_a_whole_result(atlas_file, labels):
         np.testing.assert_array_equal(function(frame[["lam", "w_f"]], n=2).n, 2)
     short = frame.assign(lam=1.0)
     assert set(atlas_file.states(short, outside="nan").status) == {status.NO_TRANSITION}
+
+
+def test_series_for_a_whole_result(atlas_file, labels):
+    lam, w_f = labels
+    for function in (atlas_file.states, towatlas.solve_critical):
+        found = function(lam, w_f=w_f)
+        assert list(found.index) == ["a", "b", "c"]
+        assert found.gamma["c"] == pytest.approx(float(function(40.0, 3.0).gamma), rel=2e-14, abs=0)
+
+
+@pytest.mark.parametrize("function", [towatlas.equilibria_many, towatlas.stability_many])
+def test_frames_of_many_shapes(function, labels):
+    """A row a shape, under the labels of the system; one for a system that has none."""
+    lam, w_f = labels
+    gamma = pd.Series([2.5, 0.3, 0.5], index=["c", "a", "b"])
+    frame = pd.DataFrame({"lam": lam, "w_f": w_f, "gamma": gamma, "ship": ["x", "y", "z"]})
+    plain = function(frame.lam.to_numpy(), frame.w_f.to_numpy(), frame.gamma.to_numpy(), C=0.01)
+    counts = plain["count"].values.tolist()
+    assert len(set(counts)) > 1
+    there = [(row, shape) for row, count in enumerate(counts) for shape in range(count)]
+    found = function(frame, C=0.01)
+    assert found.index.names == [None, "shape"]
+    assert list(found.index) == [("abc"[row], shape) for row, shape in there]
+    for name in ("r_f", "nodes", "kind") if "kind" in plain else ("r_f", "nodes"):
+        assert found[name].tolist() == [plain[name].values[at] for at in there]
+    assert found.gamma.tolist() == [gamma["abc"[row]] for row, _ in there]
+    pd.testing.assert_frame_equal(function(lam, w_f, gamma, C=0.01), found)
+    pd.testing.assert_frame_equal(function(frame[["w_f", "lam"]], gamma=gamma, C=0.01), found)
+    broken = function(frame.assign(lam=-1.0), C=0.01)
+    assert list(broken.index) == [("a", 0), ("b", 0), ("c", 0)]
+    assert set(broken.status) == {status.BAD_INPUT}
+    twice = pd.MultiIndex.from_tuples([("north", 1), ("north", 1)], names=["leg", "run"])
+    found = function(pd.DataFrame({"lam": 3.0, "w_f": 1.0, "gamma": 0.2}, index=twice))
+    assert (found.index.names, len(found)) == (["leg", "run", "shape"], 2)
 
 
 def test_frames_that_lack_or_repeat_are_refused(atlas_file):
@@ -178,6 +217,14 @@ def test_answers_say_what_they_hold(atlas_file):
     assert "system          lam = 37.8, w_f = 1352\n" in repr(found)
     assert repr(atlas_file.critical) == "critical speeds: n 1 .. 6, w_f 0 .. 10000, lam - lambda_c 0.001 .. 1000"
     assert repr(pickle.loads(pickle.dumps(found))) == repr(found)
+    branches = repr(towatlas.diagram(10.0, 1.0, gamma=(0.2, 0.4))).splitlines()
+    assert branches == [
+        "Diagram over gamma 0.2 to 0.4, 1 branches, lam = 10, w_f = 1",
+        "  Branch 'outward': 0.2 (range) stable 0.4 (range)",
+    ]
+    lines = repr(towatlas.design(towatlas.read_scene("skop-fig3"), depth=0.6, model="vacuum")).splitlines()
+    assert lines[0].startswith("Design for 'NRL Report 7048, Fig. 3': depth 0.6 m, vacuum model, ")
+    assert any("m: 1 nodes, radius 0.000" in line for line in lines[1:])
 
 
 def test_answers_as_datasets_and_frames(atlas_file, tmp_path):

@@ -8,6 +8,7 @@ import sys
 
 import netCDF4
 import numpy as np
+import pandas as pd
 import pytest
 from helpers import SMALL_GRID, SMALL_SCAN, run
 
@@ -156,6 +157,11 @@ def test_nothing_is_extrapolated(file):
         table.flutter(threshold + 11.0, 5.0)
     with pytest.raises(ValueError, match="n = 2 is outside"):
         table.flutter(threshold + 5.0, 5.0, 2)
+    edges = table.flutter(threshold + 5.0, 5.0)
+    assert repr(edges).startswith(f"FlutterSpeeds, {len(edges.gamma)} edges\n")
+    assert edges.to_dataframe().gamma.tolist() == edges.gamma.tolist()
+    frame = pd.DataFrame({"w_f": 5.0, "gamma": 0.9 * fold, "lam": threshold + 5.0}, index=["a", "b"])
+    assert table.growth(frame).kind.to_dict() == {"a": "stable", "b": "stable"}
     assert table.flutter(threshold + 11.0, 5.0, outside="nan").status == status.OUTSIDE
     assert table.flutter(0.5, 5.0).status == status.NO_TRANSITION
 

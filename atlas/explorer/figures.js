@@ -99,7 +99,6 @@ function speedAxis() {
 function drawCharts(shapes, expected) {
   const { lam, wf, unit, force } = groups(), axis = speedAxis();
   const reach = perUnit(state.unit), ends = [axis.low * reach, axis.high * reach];
-  drawRising(ends);
   const key = JSON.stringify([lam, wf, ends, state.radius, force]);
   const both = (parts) => {
     drawBranches("diagram", "r_f", parts, axis, shapes, expected);
@@ -112,15 +111,17 @@ function drawCharts(shapes, expected) {
   } else {
     both([]);
     const many = !(workOf(lam, wf, ends[1] / unit) < CURVE_WORK);
+    computed = { key: "", parts: [] };
     $("kinds").textContent = many ? "Too many shapes over this range for a page." : "computing";
     if (!many) {
       background("branches", branchesOf(lam, wf, ends[0] / unit, ends[1] / unit, (found) => {
         const inSi = (point) => ({ speed: point.gamma * unit, r_f: point.r_f * state.radius, tension: point.tension * force });
-        computed = { key, parts: found.map(({ n, kind, points }) => ({ kind, folded: n > 0, points: points.map(inSi) })) };
+        computed = { key, parts: found.map((one) => ({ ...one, points: one.points.map(inSi) })) };
         draw();
       }));
     }
   }
+  drawRising(ends);
   drawCritical(wf, unit, ends);
 }
 
@@ -175,9 +176,11 @@ function drawRising([low, high]) {
     row.append(element("span", { class: "at" }, at), `: ${item.text}${here ? " \u25C0 you are here" : ""}`);
     return row;
   }));
+  const box = $("rising").parentNode, here = $("rising").querySelector("[aria-current]");
+  box.scrollTop = here ? here.offsetTop - box.offsetTop - 60 : 0;
   const table = tableHere();
   $("looked").textContent = withDrag() ? `Along the shape to expect, by the table. ${table.complete ? "" : "Not everywhere made out: some may be missing. "}Growth by small motions; where a jump lands is a guess.`
-    : "Without drag. The shape without a node always lasts; the outer of each pair never does; the inner ones are held by rotation and may flutter, which a table tells.";
+    : `Without drag, by small motions. The shape without a node always lasts, the outer of each pair never does, which is proved; of the inner ones windows of flutter narrower than ${100 * NARROW} % of the speed may be missed.`;
 }
 
 const MOST_CURVES = 6;

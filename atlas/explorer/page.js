@@ -140,14 +140,17 @@ function draw() {
   const shapes = shapesNow(), expected = shapes?.find((shape) => shape.expected);
   $("verdict").dataset.kind = expected?.kind ?? "unknown";
   $("now").textContent = nowText(shapes);
-  $("then").textContent = shapes ? thenText(critical) : "";
   clearTimeout(spoken);
   // Read out when the slider rests.
   spoken = setTimeout(() => { $("spoken").textContent = `${$("now").textContent} ${$("then").textContent}`; }, 700);
+  // Before the curves.
+  if (shapes?.some((shape) => shape.kind === "pending")) background("verdicts", judgedAll(shapes, draw));
+  else jobs.delete("verdicts");
   drawTable(shapes ?? []);
   drawShapes(shapes ?? []);
   drawCriticalRows(critical, unit);
   drawCharts(shapes ?? [], expected);
+  $("then").textContent = shapes ? thenText(critical) : "";
 }
 
 function drawControls() {

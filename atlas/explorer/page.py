@@ -13,7 +13,17 @@ from towatlas.scene.keys import KEYS
 from towatlas.scene.library import find_type, shipped_types
 
 # In the order in which they need each other.
-SCRIPTS = ("vacuum.js", "members.js", "scene.js", "draw.js", "state.js", "words.js", "figures.js", "page.js")
+SCRIPTS = (
+    "vacuum.js",
+    "members.js",
+    "motion.js",
+    "scene.js",
+    "draw.js",
+    "state.js",
+    "words.js",
+    "figures.js",
+    "page.js",
+)
 
 
 def explorer_page(tables: Sequence[dict[str, Any]]) -> str:

@@ -35,13 +35,43 @@ function computedShapes({ lam, wf, gamma, force }) {
   if (!(workOf(lam, wf, gamma) < MOST_WORK)) return null;
   const found = equilibria(lam, wf, gamma);
   if (!found) return null;
-  const median = found.length >> 1;
+  const median = found.length >> 1, rate = Math.sqrt(state.gravity / state.radius);
   return found.map((shape, k) => ({
     name: shape.name, nodes: shape.n, r_f: shape.r_f * state.radius, z_f: shape.z_f * state.radius,
-    tension: shape.tension * force, kind: shape.outer ? "divergence" : shape.n ? "rotation" : "stable", expected: k === median,
-    growth: null, frequency: null,
+    tension: shape.tension * force, expected: k === median, ...inSeconds(knownVerdict(lam, wf, gamma, shape), rate),
+    judge: () => judged(lam, wf, gamma, shape),
     curve: () => curveOf(lam, wf, gamma, shape).reverse().map(([x, z, tension]) => [x * state.radius, 0, z * state.radius, tension * force]),
   }));
+}
+
+// Verdicts by cable, speed and shape: those of the shape without a node and of outer ones are proved, those of others computed.
+const verdicts = new Map(), MOST_VERDICTS = 5000;
+const NOT_TOLD = { kind: "rotation", growth: null, frequency: null };
+const verdictKey = (lam, wf, gamma, shape) => `${lam} ${wf} ${gamma} ${shape.name}`;
+
+function knownVerdict(lam, wf, gamma, shape) {
+  if (shape.outer || !shape.n) return { kind: shape.outer ? "divergence" : "stable", growth: null, frequency: null };
+  return verdicts.get(verdictKey(lam, wf, gamma, shape)) ?? { kind: "pending", growth: null, frequency: null };
+}
+
+/** The verdict of a shape, computed where it is not known. A job. */
+function* judged(lam, wf, gamma, shape) {
+  const known = knownVerdict(lam, wf, gamma, shape);
+  if (known.kind !== "pending") return known;
+  const found = (yield* verdictOf(lam, wf, gamma, shape)) ?? NOT_TOLD;
+  if (verdicts.size >= MOST_VERDICTS) verdicts.clear();
+  verdicts.set(verdictKey(lam, wf, gamma, shape), found);
+  return found;
+}
+
+const inSeconds = ({ kind, growth, frequency }, rate) => ({
+  kind, growth: growth === null ? null : growth * rate, frequency: frequency === null ? null : frequency * rate / (2 * Math.PI),
+});
+
+/** Verdicts of shapes that have none yet. A job. */
+function* judgedAll(shapes, done) {
+  for (const shape of shapes) if (shape.kind === "pending") yield* shape.judge();
+  done();
 }
 
 function tabulatedShapes(table, speed) {
@@ -137,11 +167,16 @@ function tick() {
   if (ticking) setTimeout(tick);
 }
 
-/** Branches over the speed without drag: lists of {gamma, r_f, tension} by name, from each fold on. */
-function* branchesOf(lam, wf, low, high, done) {
-  const found = [], count = 48;
-  const add = (n, outer, kind, points) => found.push({ n, outer, kind, points });
-  const states = criticalStates(lam, wf, high, MOST_STATES);
+// Points of a branch without drag; at every so many of them what becomes of the shape is computed, and between these where it
+// may change: windows of flutter narrower than a share of the speed may be missed, and edges are known to one.
+const ALONG = 48, JUDGED = 2, NARROW = 0.01, EDGE = 0.001;
+
+/**
+ * Branches over the speed without drag, from each fold on, in stretches of one kind: {n, outer, folded, kind, points}, points of
+ * {gamma, r_f, tension}. `show` is given them first with kinds that are pending, then as they are. A job.
+ */
+function* branchesOf(lam, wf, low, high, show) {
+  const found = [], states = criticalStates(lam, wf, high, MOST_STATES);
   for (let n = 0; n <= states.length; n++) {
     const fold = n ? states[n - 1] : null;
     if (fold && fold.gamma >= high) break;
@@ -149,19 +184,71 @@ function* branchesOf(lam, wf, low, high, done) {
       const points = fold ? [{ gamma: fold.gamma, r_f: Math.abs(fold.x_f), tension: fold.tension }] : [];
       const begin = fold ? Math.max(fold.gamma, 0.999 * low) : 0.999 * low;
       let guess = NaN;
-      for (let k = fold && fold.gamma >= low ? 1 : 0; k <= count; k++) {
-        const share = (k / count) ** (fold ? 2 : 1), gamma = begin + share * (high - begin);
+      for (let k = fold && fold.gamma >= low ? 1 : 0; k <= ALONG; k++) {
+        const share = (k / ALONG) ** (fold ? 2 : 1), gamma = begin + share * (high - begin);
         const shape = member(lam, wf, gamma, n, outer, guess);
         if (shape) {
-          points.push({ gamma, r_f: shape.r_f, tension: shape.tension });
+          points.push({ gamma, r_f: shape.r_f, tension: shape.tension, shape });
           guess = shape.a;
         }
         yield;
       }
-      add(n, outer, outer ? "divergence" : n ? "rotation" : "stable", points);
+      found.push({ n, outer, folded: n > 0, points, kind: outer ? "divergence" : n ? "pending" : "stable" });
     }
   }
-  done(found, states);
+  show(found);
+  if (!found.some((one) => one.kind === "pending")) return;
+  const stretches = [];
+  for (const branch of found) {
+    if (branch.kind === "pending") stretches.push(...yield* stretchesOf(lam, wf, branch));
+    else stretches.push(branch);
+  }
+  show(stretches);
+}
+
+/** Stretches of one kind of a branch of inner shapes. A job. */
+function* stretchesOf(lam, wf, branch) {
+  const at = function* (point) { return { ...point, verdict: yield* judged(lam, wf, point.gamma, point.shape) }; };
+  const samples = [];
+  for (const [k, point] of branch.points.entries()) {
+    if (point.shape && (k % JUDGED === 0 || k === branch.points.length - 1)) samples.push(yield* at(point));
+  }
+  if (!samples.length) return [{ ...branch, kind: "rotation" }];
+  const between = function* (one, other) {
+    const differ = classOf(one) !== classOf(other);
+    if (other.gamma - one.gamma < (differ ? EDGE : NARROW) * one.gamma || !(differ || mayMeet(one.verdict, other.verdict))) return [];
+    const gamma = 0.5 * (one.gamma + other.gamma), shape = member(lam, wf, gamma, branch.n, false, one.shape.a);
+    if (!shape) return [];
+    const middle = yield* at({ gamma, shape, r_f: shape.r_f, tension: shape.tension });
+    return [...yield* between(one, middle), middle, ...yield* between(middle, other)];
+  };
+  const all = [samples[0]];
+  for (let k = 1; k < samples.length; k++) all.push(...yield* between(samples[k - 1], samples[k]), samples[k]);
+  const rest = branch.points.filter((point) => !all.some((one) => one.gamma === point.gamma));
+  const stretches = [];
+  for (const point of [...all, ...rest].sort((one, other) => one.gamma - other.gamma)) {
+    const last = stretches[stretches.length - 1];
+    if (last && (!point.verdict || !last.class || classOf(point) === last.class)) last.points.push(point);
+    else {
+      if (last) last.points.push(point);
+      stretches.push({ ...branch, folded: branch.folded && !last, points: [point] });
+    }
+    const now = stretches[stretches.length - 1];
+    if (!point.verdict) continue;
+    now.class = classOf(point);
+    if (!(point.verdict.growth <= now.growth)) Object.assign(now, { kind: point.verdict.kind, growth: point.verdict.growth });
+  }
+  return stretches;
+}
+
+/** Kinds of which stretches are made: a window of flutter is weak only if it is so all over. */
+const classOf = ({ verdict: { kind } }) => (kind === "weak" ? "flutter" : kind);
+
+/** Whether two swings of a shape that lasts may meet between two speeds: they are no farther apart than they move. */
+function mayMeet({ squares: one }, { squares: other }) {
+  if (!one || !other) return false;
+  return one.slice(0, Math.min(one.length, other.length)).some((s, j, all) => j > 0
+    && Math.min(s - all[j - 1], other[j] - other[j - 1]) < Math.abs(s - other[j]) + Math.abs(all[j - 1] - other[j - 1]));
 }
 
 /** Critical speeds over the length: lists of [lam, gamma] for n = 1, 2 ... */

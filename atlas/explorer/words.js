@@ -3,11 +3,11 @@
 
 const KINDS = {
   stable: "lasts", weak: "lasts, while a slow swing grows a little", flutter: "flutters: swings grow", divergence: "left at once: unstable",
-  rotation: "held by its rotation; may flutter", unknown: "not known",
+  rotation: "not computed for this cable; may flutter", pending: "being computed", unknown: "not known",
 };
 const KIND_LINES = {
   stable: "lasts", weak: "lasts, a slow swing grows a little", flutter: "flutters", divergence: "unstable: left at once",
-  rotation: "held by rotation, may flutter",
+  rotation: "not computed for this cable; may flutter", pending: "being computed",
 };
 
 const WORDS = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"];
@@ -37,8 +37,8 @@ function fateText(shape) {
     return `flutters: swings grow${doublingText(shape.growth)}${swingsText(shape)}`;
   }
   return {
-    stable: "lasts", weak: "lasts", divergence: "is left at once", rotation: "is held by nothing but its rotation: it may flutter",
-    unknown: "may last or not: not known",
+    stable: "lasts", weak: "lasts", divergence: "is left at once", pending: "is held by its rotation: whether it flutters is being computed",
+    rotation: "is held by nothing but its rotation: whether it flutters is not computed for this cable", unknown: "may last or not: not known",
   }[shape.kind];
 }
 
@@ -54,9 +54,12 @@ function thenText(states) {
   if (!count) return "The cable is too short for a jump: at every speed it has one shape.";
   const passed = states.filter((one) => one.gamma <= gamma).length, next = states[passed], last = states[passed - 1];
   const percent = (one) => `${digits(100 * Math.abs(one.gamma / gamma - 1), 2)} %`;
-  const up = next ? `at ${speedText(next.gamma * unit)} (${percent(next)} more) two shapes with ${nodesText(next.n)} appear, and the cable may jump to one`
+  const speed = gamma * unit, here = stretchesOver(passed, 0, Infinity), k = here.findIndex((one) => one.low <= speed && speed < one.high);
+  const begins = k >= 0 ? here[k + 1] : null;
+  const up = begins && !(next && next.gamma * unit < begins.low) ? `from ${speedText(begins.low)} on it ${FATES[begins.kind]}`
+    : next ? `at ${speedText(next.gamma * unit)} (${percent(next)} more) two shapes with ${nodesText(next.n)} appear, and the cable may jump to one`
     : "no further shapes appear that this page lists";
-  const down = last ? `at ${speedText(last.gamma * unit)} (${percent(last)} less) this shape ends, and the cable must jump` : "the cable keeps its one shape";
+  const down = k > 0 ? `below ${speedText(here[k].low)} it ${FATES[here[k - 1].kind]}` : last ? `at ${speedText(last.gamma * unit)} (${percent(last)} less) this shape ends, and the cable must jump` : "the cable keeps its one shape";
   return `Faster: ${up}. Slower: ${down}.`;
 }
 
@@ -101,11 +104,24 @@ function risingItems(states, low, high) {
       : { low: part.low, high: part.high, text: seenText(part), kind: part.kind }));
   }
   const { unit } = groups(), edges = states.map((one) => one.gamma * unit).filter((speed) => speed < high);
-  return [0, ...edges].map((from, n) => ({
-    low: from, high: edges[n] ?? high,
-    text: n ? `${counted(2 * n + 1, "shape")}; a jump to one with ${nodesText(n)} is possible` : "one shape, without a node",
-    kind: n ? "rotation" : "stable",
-  }));
+  return [0, ...edges].flatMap((from, n) => {
+    const to = edges[n] ?? high, lead = n ? `${counted(2 * n + 1, "shape")}; a jump to one with ${nodesText(n)} is possible` : "one shape, without a node";
+    const parts = n ? stretchesOver(n, from, to) : [];
+    if (!parts.length) return [{ low: from, high: to, text: n ? `${lead}; ${KIND_LINES.rotation}` : lead, kind: n ? "rotation" : "stable" }];
+    return parts.map((part, k) => ({ ...part, text: `${k ? `the shape with ${nodesText(n)}` : `${lead}, which`} ${FATES[part.kind]}` }));
+  });
+}
+
+const FATES = {
+  stable: "lasts", weak: "lasts, a slow swing growing a little", flutter: "flutters", divergence: "is left at once",
+  rotation: "may flutter: not computed for this cable", pending: "may flutter: being computed",
+};
+
+/** Stretches of one kind of the inner shape with n nodes between two speeds in m/s, as far as they are known. */
+function stretchesOver(n, low, high) {
+  return computed.parts.filter((part) => part.n === n && !part.outer && part.points.length > 1)
+    .map(({ kind, points }) => ({ kind, low: Math.max(low, points[0].speed), high: Math.min(high, points[points.length - 1].speed) }))
+    .filter((part) => part.low < part.high);
 }
 
 /** The scene on show as a file that towatlas reads. */

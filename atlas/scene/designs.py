@@ -103,7 +103,7 @@ class Cable:
         return int(np.argmin(np.abs(np.abs(self.jumps.gamma) - abs(gamma)))) if len(self.jumps) else -1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Design:
     """Cables that bring the fish of a scene to where it is wanted, in rising order of length.
 
@@ -146,6 +146,17 @@ class Design:
     least: float
     most: float
     complete: bool
+
+    def __repr__(self) -> str:
+        what = f"{self.quantity} {self.value:.6g} {UNITS[self.quantity]}"
+        lines = [f"Design for {self.scene.title!r}: {what}, {self.model} model, {len(self.chosen)} cables"]
+        for one in self.chosen:
+            last = f", {one.verdict.kind}" if one.verdict else ""
+            seen = ", expected" if one.expected else ""
+            lines.append(
+                f"  {one.length:.6g} m: {one.nodes} nodes, radius {one.radius:.6g} m, {one.tension:.6g} N{last}{seen}"
+            )
+        return "\n".join(lines)
 
     @property
     def notes(self) -> list[str]:

@@ -10,6 +10,7 @@ from towatlas.checks import check_real
 from towatlas.effort import SECONDS, check_patience, patience
 from towatlas.kernels import status
 from towatlas.kernels.system import COLUMNS, W_F, W
+from towatlas.labelled import takes_frames
 from towatlas.solve.drag_equilibria import fill, quantities
 from towatlas.solve.search import BLOCK, search
 from towatlas.solve.shots import REMEDY, Array
@@ -34,6 +35,7 @@ FIELDS = {
 }
 
 
+@takes_frames
 def equilibria_many(
     lam: ArrayLike,
     w_f: ArrayLike,
@@ -52,15 +54,16 @@ def equilibria_many(
     Parameters
     ----------
     lam, w_f, gamma, C, m_f, C_f, w, C_t, C_s, b_s : array_like
-        As of `equilibria`; arrays that broadcast.
+        As of `equilibria`; arrays that broadcast, Series, or one DataFrame with such columns.
 
     Returns
     -------
-    xarray.Dataset
+    xarray.Dataset or pandas.DataFrame
         Over (system, shape): the fields of `Equilibria`, shapes in rising order of R_x0, nan, -1 or False beyond the
         last. Over system: the systems, gamma, count, the number of shapes, and status, a code of
         `towatlas.kernels.status`; a system that fails does not spoil the others. Where the broadcast shape has more
-        than one dimension, system_0, system_1, ... in place of system.
+        than one dimension, system_0, system_1, ... in place of system. Of Series or a DataFrame a DataFrame: a row a
+        shape, its number behind the index; one row for a system without any.
 
     Raises
     ------
@@ -128,8 +131,8 @@ def _solve(systems: Array, gamma: Array) -> tuple[dict[str, Any], Any, Any]:
         parts.append(quantities(found.row, found.x, systems[block], gamma[block]))
         rows.append(block[found.row])
     if not parts:
-        nothing = search(systems[:0], gamma[:0])
-        parts, rows = [quantities(nothing.row, nothing.x, systems[:0], gamma[:0])], [nothing.row]
+        none = np.empty(0, np.int64)
+        parts, rows = [quantities(none, np.empty(0), systems[:0], gamma[:0])], [none]
     row = np.concatenate(rows)
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return fill(columns, row, len(gamma)), np.bincount(row, minlength=len(gamma)), codes

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from towatlas.effort import SECONDS, TooMuchWork, check_patience, patience
 from towatlas.kernels import status
 from towatlas.kernels.system import COLUMNS
+from towatlas.labelled import takes_frames
 from towatlas.solve.growth import REMEDY
 from towatlas.solve.many import equilibria_many
 from towatlas.solve.motion import Array, Integers
@@ -33,6 +34,7 @@ FIELDS = {
 }
 
 
+@takes_frames
 def stability_many(
     lam: ArrayLike,
     w_f: ArrayLike,
@@ -55,7 +57,7 @@ def stability_many(
 
     Returns
     -------
-    xarray.Dataset
+    xarray.Dataset or pandas.DataFrame
         That of `equilibria_many`, and over (system, shape) as of `Stability`: growth, frequency, unstable, index, kind;
         growth_error, their error, and growth_status, a code of `towatlas.kernels.status`; nan, -1 or "" beyond the
         last. A shape that fails does not spoil the others.

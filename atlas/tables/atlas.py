@@ -433,6 +433,7 @@ class Atlas:
         table = self.drag.answer(outside, lam=lam.ravel(), w_f=w_f.ravel(), C=C.ravel(), n=n.ravel())
         return DragFolds(n=n, lam=lam, w_f=w_f, C=C, **_shaped(table, n))
 
+    @takes_frames
     def growth(
         self, lam: ArrayLike, w_f: ArrayLike, gamma: ArrayLike, n: ArrayLike | None = None, outside: str = "raise"
     ) -> GrowthRates:
