@@ -102,6 +102,7 @@ def test_folds(name):
         assert 12 < abs(coarse - gamma) / abs(fine - gamma) < 20
 
 
+@pytest.mark.slow
 def test_a_jump_comes_late_by_the_law():
     """The fish of a chain past its own fold, its speed rising by half a knot in 32 turns; the law from growth rates."""
     scene = make_scene(DEEP)
