@@ -392,6 +392,10 @@ def test_never_across_a_fold_or_an_edge(fine):
 
 def test_points_of_a_map_are_themselves(fine, small):
     known = towatlas.open_map(fine)
+    lines = repr(known).splitlines()
+    assert lines[0].startswith(f"Map of {known.dataset['count'].size} systems: ")
+    assert lines[1].startswith("  lam: ")
+    assert lines[1].endswith(", 3 to 5")
     row = known.dataset.isel(lam=4, gamma=30)
     found = known.at(lam=float(row.lam), gamma=float(row.gamma))
     np.testing.assert_array_equal(found.x_f.values[0], row.x_f.values)

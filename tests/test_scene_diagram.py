@@ -54,6 +54,9 @@ def test_rising_and_falling_are_the_windows_of_flutter(fig3):
     lines = lines_of(fig3)
     assert "flutter about two nodes, e times larger in" in lines[0]
     assert "the other way round" in lines[1]
+    held = repr(fig3).splitlines()
+    assert held[0] == "SceneDiagram of 'NRL Report 7048, Fig. 3': speed 1.34 to 1.4 m/s, air model"
+    assert held[1:] == [f"  {branch!r}" for branch in fig3.branches]
 
 
 @pytest.mark.slow

@@ -37,7 +37,7 @@ FIXED = ("nodes", "near_axis")
 NEVER = ("kind", "unstable", "growth_status", "error", "growth_error")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Map:
     """A map that has been opened.
 
@@ -48,6 +48,11 @@ class Map:
     """
 
     dataset: "xarray.Dataset"
+
+    def __repr__(self) -> str:
+        lines = [f"  {name}: {len(values)}, {values[0]:g} to {values[-1]:g}" for name, values in self.axes.items()]
+        systems = int(np.prod([len(values) for values in self.axes.values()]))
+        return "\n".join([f"Map of {systems} systems: {', '.join(map(str, self.dataset.data_vars))}", *lines])
 
     @property
     def axes(self) -> dict[str, Array]:

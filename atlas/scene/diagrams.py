@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 UNITS = {"speed": "m/s", "length": "m"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SceneDiagram:
     """All branches of shapes of a scene over its speed, or over the length of its cable.
 
@@ -58,6 +58,11 @@ class SceneDiagram:
     looked_at: str
     unit: str
     size: float
+
+    def __repr__(self) -> str:
+        ends = f"{self.low:.6g} to {self.high:.6g} {'m/s' if self.moved == 'speed' else 'm'}"
+        first = f"SceneDiagram of {self.scene.title!r}: {self.moved} {ends}, {self.model} model"
+        return "\n".join([first, *(f"  {branch!r}" for branch in self.branches)])
 
     def rising(self) -> list[Stretch | Jump]:
         """What is seen from the lowest value to the highest, beginning with the shape expected.
