@@ -48,10 +48,11 @@ def test_table_for_people(critical):
 
 
 def test_solve_needs_no_atlas_and_has_no_last_n(capsys):
-    code, out, _ = run(
+    code, out, err = run(
         capsys, "critical", "--lam", 100, "--wf", 1, "--n", 40, "--solve", "--json", "--atlas", "absent.nc"
     )
     assert code == 0
+    assert "--atlas is left alone" in err
     assert json.loads(out)[0]["gamma"] == pytest.approx(float(towatlas.solve_critical(100, 1, 40).gamma), rel=1e-14)
 
 

@@ -59,6 +59,8 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     lam, w_f = options.lam, options.wf
+    if options.solve and options.atlas is not None:
+        say("--solve looks nothing up: --atlas is left alone")
     if options.C is not None:
         return critical_drag.run(options)
     existing = transitions(lam=lam, w_f=w_f)
