@@ -298,3 +298,11 @@ def test_cables_without_transitions(ask):
 def test_a_search_of_minutes_is_refused():
     with pytest.raises(ArithmeticError, match=r"too many to search.*--max-length"):
         cables_to_depth(w_f=1352, gamma=2.97, z_f=28_600, lam_max=286_000)
+
+
+def test_what_larger_models_were_not_asked_is_said(capsys):
+    """Position and tension are those of air; jumps are not."""
+    said = "are those of the vacuum model, which was compared in the position and tension"
+    ask = ("design", "--scene", "skop-fig3", "--depth=25in", "--max-length=0.7m")
+    assert said in run(capsys, *ask)[1]
+    assert said not in run(capsys, *ask, "--model=vacuum")[1]

@@ -102,9 +102,19 @@ def test_largest_tension_and_strength(capsys, tmp_path):
         assert answer["largest_tension_N"] == pytest.approx(8 * 9.80665, rel=1e-3)
         assert (code, answer["largest_tension_at_m"]) == (expected, 0.0)
         assert answer["breaking_ratio"] == answer["largest_tension_N"] / answer["breaking_strength_N"]
+        assert answer["largest_tension_others_N"] is None
         assert ("the largest tension, 78.4" in err) == (expected == 6)
     file.write_text(text.format("20 lbf"))
     assert "17.64 lbf at the tow point, 88.2 % of cable.breaking_strength" in run(capsys, "scene", file)[1]
+    # Faster there are three shapes.
+    file.write_text(text.format("20 lbf").replace("speed = 0.1", "gamma = 1.2"))
+    answer, out = json.loads(run(capsys, "scene", file, "--json")[1]), run(capsys, "scene", file)[1]
+    pulls = [shape["tension_N"] for shape in answer["equilibria"] if not shape["expected"]]
+    assert answer["largest_tension_others_N"] >= max(pulls)
+    ratio = 100 * answer["largest_tension_others_N"] / answer["breaking_strength_N"]
+    assert (
+        f"; in other shapes up to {answer['largest_tension_others_N'] / 4.4482216152605:.4g} lbf, {ratio:.3g} %" in out
+    )
 
 
 # gamma_c2 lies 3.5 % above, gamma_c1 at a twentieth.
@@ -179,7 +189,7 @@ def test_what_cannot_be_computed_is_said(capsys, monkeypatch, tmp_path):
     code, out, _ = run(capsys, *ASK)
     assert code == 0
     assert "; what it costs could not be computed: too long" in out
-    assert "largest tension along the cable: not computed" in out
+    assert "largest tension along the cable, expected shape: not computed" in out
     answer = json.loads(run(capsys, *ASK, "--json")[1])
     assert (answer["largest_tension_N"], answer["nearest_jumps"]["above"]["before"]) == (None, None)
     strong = make_scene(changed(cable__breaking_strength=1e9))

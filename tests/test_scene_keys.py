@@ -464,3 +464,42 @@ def test_design_says_so_too(capsys, tmp_path):
     assert answer["notes"][0].startswith("fish.drag_coefficient is not given")
     assert answer["notes"][1].startswith("extrapolated: pode-G")
     assert all(note in err for note in answer["notes"])
+
+
+def test_a_cable_of_no_material_is_asked_about():
+    """Grams and millimetres without their units."""
+    table = {
+        "cable": {"length": 100.0, "mass_per_length": 0.02, "diameter": "2 mm"},
+        "fish": {"mass": 1.0},
+        "tow": {"radius": 10.0, "speed": 10.0},
+        "fluid": {"name": "vacuum"},
+    }
+    assert not make_scene(table).notes
+    for change in ({"mass_per_length": 20.0}, {"diameter": 2.0}):
+        (note,) = make_scene(table | {"cable": table["cable"] | change}).notes
+        assert note.startswith("cable.mass_per_length = ")
+        assert note.endswith("kg/m^3: are their units the right ones?")
+
+
+def test_a_circle_that_followed_from_a_speed_stays_and_is_told():
+    table = {
+        "cable": {"length": 100.0, "mass_per_length": 0.02, "diameter": "2 mm"},
+        "fish": {"mass": 1.0},
+        "tow": {"bank_angle": "25 deg", "speed": 46.3},
+        "fluid": {"name": "vacuum"},
+    }
+    scene = make_scene(table)
+    faster = scene.at(speed=50.0)
+    assert faster.radius == scene.radius
+    (note,) = faster.notes
+    radius = f"tow.radius is {scene.radius:.6g} m"
+    assert note == f"the circle stays at another speed: {radius}, as tow.speed and tow.bank_angle made it"
+    assert faster.at(speed=51.0).notes == faster.notes
+
+
+@pytest.mark.parametrize("command", [("sweep", "skop-fig3"), ("diagram", "skop-fig3"), ("scene", "skop-fig3")])
+def test_ends_of_a_range_have_units_both_or_neither(capsys, tmp_path, command):
+    ask = "--seen" if command[0] == "scene" else "--speed"
+    code, _, err = run(capsys, *command, ask, "1.2:1.3kn", *(("--out", tmp_path / "a.svg") if ask == "--speed" else ()))
+    assert code == 2
+    assert "what unit is 1.2 in?" in err

@@ -11,6 +11,7 @@ from towatlas.commands.quantities import quantity
 from towatlas.commands.scene import describe_speed, scene_of
 from towatlas.commands.scene_stability import verdict_object
 from towatlas.scene.designs import LOOKED, UNITS, Cable, Design, design
+from towatlas.scene.models import solvable_models
 from towatlas.scene.ranges import POINTS
 from towatlas.scene.scene import MODELS
 
@@ -180,6 +181,7 @@ def _text(found: Design, rows: list[dict[str, Any]]) -> str:
         describe_speed(scene),
         f"{found.quantity} of {found.value:.6g} {UNITS[found.quantity]}, cables up to {found.longest:.4g} m",
         f"model: {found.model}; {found.reason}",
+        *_of_jumps(found),
         f"nearest jump: between {LOOKED[0]:g} and {LOOKED[1]:g} times the speed, its speed less the scene's",
         "",
         f"{'length m':>13} {'nodes':>5} {'fish x m':>11} {'y m':>11} {'depth m':>11} {'tension N':>11} {'shape':>7} "
@@ -198,6 +200,16 @@ def _text(found: Design, rows: list[dict[str, Any]]) -> str:
         kind = row["stability"]["kind"]
         lines.append(f"{cells}{jump}  {kind}{'  expected' if row['expected'] else ''}")
     return "\n".join(lines)
+
+
+def _of_jumps(found: Design) -> list[str]:
+    """What larger models were not asked about."""
+    if found.forced or found.model == solvable_models(found.scene)[0][-1]:
+        return []
+    return [
+        f"jumps, and shapes that are not expected, are those of the {found.model} model, which was compared in the "
+        "position and tension of the expected shape alone: `towatlas scene` with that length, or --model, says more"
+    ]
 
 
 def _of(row: dict[str, Any]) -> str:

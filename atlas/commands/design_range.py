@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from towatlas.commands.common import FAILED, NO_STATE, OK, print_json, real, say
-from towatlas.commands.quantities import quantity
+from towatlas.commands.quantities import ends_of, quantity
 from towatlas.commands.scene import scene_of
 from towatlas.commands.scene_stability import verdict_object
 from towatlas.scene.designs import UNITS
@@ -22,7 +22,10 @@ def speeds(text: str) -> Speeds:
     one = quantity("m/s")
     if ":" not in text:
         return float(one(text))
-    parts = text.split(":")
+    try:
+        parts = ends_of(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
     if len(parts) != 2:
         raise argparse.ArgumentTypeError(f"{text} is no range of speeds, as 3kn:5kn")
     low, high = (float(one(part)) for part in parts)

@@ -37,6 +37,26 @@ class Range:
     size: float
 
 
+def ends_of(text: str) -> list[str]:
+    """The two values of a range A:B; both with a unit, or neither."""
+    parts = [part.strip() for part in text.split(":")]
+    if len(parts) == 2:
+        plain = [is_plain(part) for part in parts]
+        if plain[0] != plain[1]:
+            bare, full = parts if plain[0] else parts[::-1]
+            raise ValueError(f"{text}: what unit is {bare} in? Write it as that of {full}")
+    return parts
+
+
+def is_plain(text: str) -> bool:
+    """Whether a text is a number alone."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def range_of(unit: str) -> Any:
     """The type of an argument that is two values of a unit with a colon between them."""
     one = quantity(unit)
@@ -44,7 +64,10 @@ def range_of(unit: str) -> Any:
     def parsed(text: str) -> Range:
         from towatlas.scene.units import parse_quantity, written_unit
 
-        parts = text.split(":")
+        try:
+            parts = ends_of(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
         if len(parts) != 2:
             raise argparse.ArgumentTypeError(f"{text} is no range, as 1{unit}:8{unit}")
         low, high = (float(one(part)) for part in parts)

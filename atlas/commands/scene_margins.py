@@ -102,6 +102,7 @@ def as_object(found: Margins, asked: float | None, known: Sensitivities | None) 
         "tension_sd_N": real(spread.get("tension", math.nan)),
         "largest_tension_N": real(found.largest_tension),
         "largest_tension_at_m": real(found.at),
+        "largest_tension_others_N": real(found.of_others),
         "largest_tension_sd_N": real(spread.get("largest_tension", math.nan)),
         "breaking_strength_N": real(scene.breaking_strength),
         "breaking_ratio": real(found.breaking_ratio),
@@ -234,12 +235,20 @@ def lines_of(found: Margins, answer: SceneAnswer) -> list[str]:
             f"{_amount(answer.choice.answer.tension, 'N', units, spread['tension'])}"
         )
     if math.isnan(found.largest_tension):
-        lines.append("largest tension along the cable: not computed")
+        lines.append("largest tension along the cable, expected shape: not computed")
     else:
         place = "at the tow point" if found.at == 0.0 else f"{_amount(found.at, 'm', units)} from the tow point"
-        ratio = f", {100 * found.breaking_ratio:.3g} % of cable.breaking_strength" if found.breaking_ratio > 0.0 else ""
+        strength = scene.breaking_strength
+
+        def ratio(pull: float) -> str:
+            return f", {100 * pull / strength:.3g} % of cable.breaking_strength" if strength > 0.0 else ""
+
         pull = _amount(found.largest_tension, "N", units, spread.get("largest_tension", 0.0))
-        lines.append(f"largest tension along the cable: {pull} {place}{ratio}")
+        others = ""
+        if found.of_others > 0.0:
+            others = f"; in other shapes up to {_amount(found.of_others, 'N', units)}{ratio(found.of_others)}"
+        share = ratio(found.largest_tension)
+        lines.append(f"largest tension along the cable, expected shape: {pull} {place}{share}{others}")
     if found.flutter is not None:
         lines.append(_edge_line(found.flutter, scene))
     lines += [_jump_line(jump, found, answer.choice.model, units) for jump in found.jumps]

@@ -58,14 +58,15 @@ def _sentence(found: SceneDiagram, parts: list[Stretch | Jump], rising: bool) ->
     groups = [list(group) for _, group in groupby(parts, key=_group)]
     for group, after in zip(groups, [*groups[1:], None], strict=True):
         if isinstance(group[0], Jump):
-            words.append(f"a jump at {_value(found, group[0].value)}{'' if after else ', beyond which no shape lasts'}")
+            beyond = "" if after else ", beyond which no shape is known to last"
+            words.append(f"a jump at {_value(found, group[0].value)}{beyond}")
             continue
         stretches = [part for part in group if isinstance(part, Stretch)]
         ends = stretches[0], stretches[-1]
         begin, end = (ends[0].low, ends[1].high) if rising else (ends[0].high, ends[1].low)
         start = f"{_value(found, begin)} " if words else ""
         span = f"{start}to {_value(found, end)}" if after else f"from {_value(found, begin)} on"
-        span = span if after or words else "throughout"
+        span = span if after or words else f"from {_value(found, begin)} to {_value(found, end)}"
         words.append(f"{_what(stretches)} {span}{_weakly(found, stretches)}")
     return "; ".join(words)
 
@@ -84,7 +85,7 @@ def _what(group: list[Stretch]) -> str:
         worst = max(group, key=lambda part: part.growth)
         span = f"about {_nodes(low)}" if low == high else f"between {_nodes(low)} and {_nodes(high)}"
         return f"flutter {span}, e times larger in {_time(worst)} at {worst.frequency:.3g} Hz,"
-    text = _nodes(low) if low == high else f"{_nodes(low)}, then {_nodes(high)},"
+    text = _nodes(low) if low == high else f"{_nodes(low)} to {_nodes(high)},"
     return f"{text} (whether it lasts is not known)" if kind == "unknown" else text
 
 

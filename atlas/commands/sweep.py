@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from towatlas.commands.common import FIGURE_FORMATS, OK, add_patience, new_figure, print_json, real, save_figure, say
+from towatlas.commands.quantities import ends_of
 from towatlas.scene.file import read_scene
 from towatlas.scene.scene import MODELS, Scene
 from towatlas.scene.sweeps import FIELDS, MOST, sweep
@@ -103,7 +104,10 @@ def _members(options: argparse.Namespace, swept: str) -> tuple[list[dict[str, An
 
 def _range(option: str, text: str, unit: str, radius: float, points: int) -> np.ndarray:
     """Values from A to B."""
-    parts = text.split(":")
+    try:
+        parts = ends_of(text)
+    except ValueError as error:
+        raise ValueError(f"{option} {error}") from None
     if len(parts) != 2:
         raise ValueError(f"{option} {text}: two values, as A:B")
     ends = []

@@ -1,6 +1,7 @@
 """The keys of a scene: which there are, their units, and what is asked about their values."""
 
 import difflib
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -82,6 +83,8 @@ _MEANT = {
     "cable.submerged_weight": "cable.submerged_weight_per_length",
     "fish.weight": "fish.mass, in air, or fish.submerged_weight",
 }
+# Densities of a cable outside of which its mass and diameter are asked about, from a foam line to tungsten [kg/m^3].
+DENSITIES = (50.0, 3e4)
 # What lies outside is asked about: by unit, from the finest thread and the smallest bead to a cable across an ocean.
 _USUAL = {
     "m": (1e-6, 1e7),
@@ -150,7 +153,20 @@ def parse_scene(table: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, flo
         for name, deviation in deviations.items()
         if deviation > LARGE * abs(values[name])
     ]
-    return values, deviations, questions
+    return values, deviations, [*questions, *_density_question(flat, values)]
+
+
+def _density_question(flat: Mapping[str, Any], values: Mapping[str, Any]) -> list[str]:
+    """What is asked about a cable of another density than any material's."""
+    names = ("cable.mass_per_length", "cable.diameter")
+    if not all(0.0 < values.get(name, 0.0) < math.inf for name in names):
+        return []
+    mass, diameter = (values[name] for name in names)
+    density = 4.0 * mass / (math.pi * diameter**2)
+    if DENSITIES[0] <= density <= DENSITIES[1]:
+        return []
+    written = " and ".join(f"{name} = {short(flat[name])}" for name in names)
+    return [f"{written} make a cable of {density:.3g} kg/m^3: are their units the right ones?"]
 
 
 def parse_value(name: str, value: Any, unit: str | tuple[str, ...]) -> Any:

@@ -128,6 +128,8 @@ class Margins:
         Along the cable in the shape expected [N], > 0; nan where it could not be computed.
     at : float
         Where, along the cable from the tow point [m], >= 0.
+    of_others : float
+        Largest tension along the cable in any other shape [N], > 0; nan without one, or where it could not be computed.
     deviations : dict of float
         Standard deviations to first order of "depth" [m], "tension" and "largest_tension" [N], and of what the strength
         has left over, "breaking_margin" [N]; empty where no key is uncertain, nan where not known.
@@ -144,6 +146,7 @@ class Margins:
     complete: bool
     largest_tension: float
     at: float
+    of_others: float
     deviations: dict[str, float]
     failure: str
     idle: tuple[str, ...]
@@ -244,6 +247,10 @@ def margins_of(answer: SceneAnswer, known: Sensitivities | None = None, reach: f
             with suppress(ArithmeticError):
                 tension, at = largest_tension(found, found.expected)
                 tension, at = tension * scene.force_unit(answer.choice.model), at * scene.radius
+        of_others = nan
+        with suppress(ArithmeticError):
+            others = [largest_tension(found, k)[0] for k in range(len(found)) if k != found.expected]
+            of_others = max(others, default=nan) * scene.force_unit(answer.choice.model)
         jumps: tuple[NearestJump, ...] = ()
         if (folds := answer.folds) is not None:
             sides = zip(("below", "above"), folds.beside(scene.gamma), strict=True)
@@ -255,6 +262,7 @@ def margins_of(answer: SceneAnswer, known: Sensitivities | None = None, reach: f
         complete=answer.folds is None or answer.folds.complete,
         largest_tension=tension,
         at=at,
+        of_others=of_others,
         deviations=_deviations(scene, known) if scene.deviations else {},
         failure=failure,
         idle=() if known is None else tuple(known.idle),

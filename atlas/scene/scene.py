@@ -279,8 +279,17 @@ class Scene:
             raise ValueError(f"give exactly one of speed, rotation_rate and gamma, not {len(checked)}")
         ((name, value),) = checked.items()
         speeds = {"speed": value, "rotation_rate": value * self.radius, "gamma": self.speed_of(value)}
+        followed = (
+            ()
+            if "tow.radius" in self.values
+            else (
+                f"the circle stays at another speed: tow.radius is {self.radius:.6g} m, as "
+                f"{' and '.join(key for key in SPEED_KEYS if key in self.values)} made it",
+            )
+        )
         return replace(
             self,
+            notes=self.notes + followed,
             speed=speeds[name],
             given=_no_speed(self.given),
             # A circle that followed from its speed stays.

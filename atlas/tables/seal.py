@@ -85,7 +85,8 @@ def read_sealed(path: Path) -> tuple[bytes, str]:
         data = path.read_bytes()
     except FileNotFoundError:
         raise FileNotFoundError(
-            f"no file at {path}; `towatlas build` makes an atlas, `towatlas build --help` says what else there is"
+            f"no file at {path}; `towatlas build` makes an atlas, `towatlas build --help` says what else there is; one "
+            "built elsewhere, as in build of a clone, is named by --atlas or $TOWATLAS_FILE"
         ) from None
     except OSError as error:
         raise AtlasFileError(f"{path} cannot be read: {error.strerror}") from None
