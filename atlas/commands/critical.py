@@ -64,7 +64,10 @@ def _run(options: argparse.Namespace) -> int:
     if options.C is not None:
         return critical_drag.run(options)
     existing = transitions(lam=lam, w_f=w_f)
-    atlas = None if options.solve else open_atlas(options.atlas)
+    try:
+        atlas = None if options.solve else open_atlas(options.atlas)
+    except FileNotFoundError as error:
+        raise FileNotFoundError(f"{error}; --solve needs none") from None
     limit = MOST_SOLVED if atlas is None else atlas.critical.n_max
     orders = np.arange(1, min(existing, limit) + 1) if options.n is None else np.array([options.n])
     if options.n is None and existing > limit:
