@@ -5,8 +5,8 @@ bit for any number of threads. Threads cost a tenth of a millisecond: for a few 
 """
 
 import os
+from _thread import LockType, allocate_lock, start_new_thread
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
@@ -113,5 +113,44 @@ def _in_threads(run: Callable[[int, int], None], begin: int, stop: int, block: i
         for first in begins:
             run(first, min(stop, first + block))
         return
-    with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(lambda first: run(first, min(stop, first + block)), begins))
+    # Not threading, and not concurrent.futures: they hold locks of the process, which a handler of signals that sweeps
+    # would wait for in vain.
+    left, failed = iter(begins), list[BaseException]()
+    others, ended = list[LockType](), list[LockType]()
+
+    def work() -> None:
+        try:
+            for first in left:
+                run(first, min(stop, first + block))
+        except BaseException as error:
+            give_up(error)
+
+    def give_up(error: BaseException) -> None:
+        failed.append(error)
+        for _ in left:
+            pass
+
+    def work_beside(done: LockType) -> None:
+        work()
+        ended.append(done)
+        done.release()
+
+    for _ in range(workers - 1):
+        done = allocate_lock()
+        done.acquire()
+        try:
+            start_new_thread(work_beside, (done,))
+        except RuntimeError:  # no more of them to be had
+            break
+        others.append(done)
+    work()
+    while len(ended) < len(others):
+        # Whatever is raised in the meantime: they write to the arrays of the caller.
+        try:
+            for done in others:
+                if done not in ended:
+                    done.acquire()
+        except BaseException as error:
+            give_up(error)
+    if failed:
+        raise failed[0]
