@@ -205,6 +205,20 @@ def test_scenes_are_read_as_the_package_reads_them(tmp_path):
         for name in ("length", "mass_per_length", "fish_mass", "radius", "speed", "gravity", "density"):
             assert found[name] == pytest.approx(getattr(ours, name), rel=1e-14), (name, text)
         assert found["title"] == ours.title
+        assert found["displaced_per_length"] == pytest.approx(ours.displaced_per_length, rel=1e-12)
+
+
+@in_node
+def test_the_drag_left_out_is_that_of_the_package():
+    texts = [SURVEY, SURVEY.replace("seawater", "air")]
+    cable = 'mass_per_length = "0.5 kg/m"\ndiameter = "12 mm"\ndrag_coefficient = 1.4\n'
+    texts.append(SURVEY.replace(cable, 'type = "pode-G"\n').replace("[tow]", '[tow]\nturn = "port"'))
+    texts.append(SURVEY.replace("[fish]", 'submerged_weight_per_length = "4 N/m"\n[fish]'))
+    texts.append(SURVEY.replace('mass_per_length = "0.5 kg/m"', 'submerged_weight_per_length = "4 N/m"'))
+    theirs = computed("given.map((text) => dragConstant(sceneOf(text, known)))", texts)
+    ours = [scene_of_text(text.encode(), "here").system("water").C for text in texts]
+    assert theirs == pytest.approx(ours, rel=1e-12)
+    assert computed("dragConstant(sceneOf(given, known))", SURVEY.replace("seawater", "vacuum")) == 0
 
 
 QUANTITIES = {

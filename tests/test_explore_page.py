@@ -160,7 +160,9 @@ def test_with_drag_it_says_what_the_diagram_says(page):
         assert ("flutter" in say(page)) == (part["kind"] == "flutter")
         assert page.run("document.querySelectorAll('#rising [aria-current]').length") == 1
     put(page, "m_s", 2 * table["high"])
-    assert "no shape is tabulated" in say(page)
+    assert f"the table covers {page.run('speedText(known.tables[0].low)')} to " in say(page)
+    assert page.run("$('then').textContent") == ""
+    assert page.run("document.querySelectorAll('#rising [aria-current]').length") == 0
     put(page, "m_s", 1.0)
     # Another cable has no table; back to the scene there is one.
     put(page, "radius", 0.02)
@@ -238,6 +240,63 @@ def test_the_scene_on_show_can_be_pasted_back_and_another(page):
     assert page.run("document.getElementById('kn').value") == "25"
     assert "At 25 kn" in say(page)
     assert page.run("document.getElementById('toml').value") == text
+
+
+BUOY = """[cable]
+length = "30 m"
+mass_per_length = "0.2 kg/m"
+diameter = "10 mm"
+drag_coefficient = 1.2
+[fish]
+mass = "5 kg"
+volume = "1 l"
+[tow]
+radius = "8 m"
+speed = "3 kn"
+[fluid]
+name = "water"
+"""
+
+
+def warning(page):
+    return page.run("$('warning').getClientRects().length ? $('warning').textContent : ''")
+
+
+def test_what_is_left_out_of_a_fluid_is_said_in_the_headline(page):
+    assert warning(page) == ""
+    assert "without drag" not in say(page)
+    assert paste(page, BUOY) == ""
+    assert say(page).startswith("At 3 kn (1.84 rpm), without drag and buoyancy, the cable")
+    # By hand: mu + rho A is 0.2 + 0.07854 kg/m; C = 1000 * 1.2 * 0.01 * 8 / (2 * 0.27854); the drag at 1.5433 m/s is
+    # 14.29 N/m, the weight 1.9613 N/m.
+    assert "C = 172 " in warning(page)
+    assert "7.3 times its weight" in warning(page)
+    assert "39 % off" in warning(page)
+    assert "towatlas explore FILE include both" in warning(page)
+    assert paste(page, BUOY.replace('"water"', '"air"')) == ""
+    assert "without drag, the cable" in say(page)
+    assert "C = 0.29 " in warning(page)
+    assert paste(page, BUOY.replace('"water"', '"vacuum"')) == ""
+    assert "without" not in say(page)
+    assert warning(page) == ""
+
+
+def test_a_cable_moved_off_its_table_is_without_drag(page):
+    put(page, "mass_per_length", 0.0007)
+    assert "without drag, the cable" in say(page)
+    scene = read_scene("skop-fig3", {"cable.mass_per_length": 0.0007})
+    assert page.run("dragConstant(state)") == pytest.approx(scene.system("water").C, rel=1e-12)
+    page.run("document.getElementById('back').click()")
+    assert "without drag" not in say(page)
+    page.run("document.getElementById('no-drag').click()")
+    assert "without drag" in say(page)
+    assert "C = 0.018" in warning(page)
+
+
+def test_faster_in_a_vacuum_says_what_begins_and_what_goes_on(page):
+    page.run("document.getElementById('no-drag').click()")
+    put(page, "m_s", 0.05)
+    assert "two other shapes begin, with one node; the one before goes on" in page.run("$('then').textContent")
 
 
 @pytest.mark.parametrize(

@@ -170,7 +170,7 @@ function drawBranches(id, height, parts, axis, shapes, expected) {
 function drawRising([low, high]) {
   const items = risingItems(critical, low, high);
   $("rising").replaceChildren(...items.map((item, k) => {
-    const here = item.low <= state.speed && (state.speed < item.high || k === items.length - 1) && item.kind !== "jump";
+    const here = item.low <= state.speed && (state.speed < item.high || (k === items.length - 1 && !isBeyond())) && item.kind !== "jump";
     const row = element("li", here ? { "aria-current": "true" } : {});
     const at = item.kind === "jump" ? speedText(item.low) : `${digits(speedIn(item.low))} to ${speedText(item.high)}`;
     row.append(element("span", { class: "at" }, at), `: ${item.text}${here ? " \u25C0 you are here" : ""}`);

@@ -100,7 +100,7 @@ function change(what) {
 
 /** Another scene on show. */
 function show(scene, k) {
-  for (const key of [...CABLE_KEYS, "speed", "gravity", "title", "density"]) state[key] = scene[key];
+  for (const key of [...CABLE_KEYS, "speed", "gravity", "title", "density", "displaced_per_length", "diameter", "drag_coefficient"]) state[key] = scene[key];
   for (const key of [...CABLE_KEYS, "speed"]) middle[key] = scene[key];
   if (!(middle.fish_mass > 0)) middle.fish_mass = scene.mass_per_length * scene.length;
   Object.assign(state, { scene: k, model: k >= 0 ? "drag" : "vacuum", picked: null });
@@ -140,9 +140,11 @@ function draw() {
   const shapes = shapesNow(), expected = shapes?.find((shape) => shape.expected);
   $("verdict").dataset.kind = expected?.kind ?? "unknown";
   $("now").textContent = nowText(shapes);
+  $("warning").textContent = warningText();
+  $("warning").hidden = !leftOut().length;
   clearTimeout(spoken);
   // Read out when the slider rests.
-  spoken = setTimeout(() => { $("spoken").textContent = `${$("now").textContent} ${$("then").textContent}`; }, 700);
+  spoken = setTimeout(() => { $("spoken").textContent = ["now", "warning", "then"].map((id) => $(id).textContent).join(" "); }, 700);
   // Before the curves.
   if (shapes?.some((shape) => shape.kind === "pending")) background("verdicts", judgedAll(shapes, draw));
   else jobs.delete("verdicts");
@@ -168,12 +170,12 @@ function drawControls() {
   $("with-drag").disabled = !tabulated;
   $("with-drag").checked = withDrag();
   $("no-drag").checked = !withDrag();
-  const table = tableHere(), beyond = table && (state.speed < table.low || state.speed > table.high);
+  const table = tableHere();
   $("why").textContent = !table ? "There is a table for the scenes of the list only: towatlas explore makes a page for yours."
     : !tabulated ? "The cable is no longer that of the scene: its table does not hold, drag is left out."
-      : withDrag() && beyond ? `The table holds from ${speedText(table.low)} to ${speedText(table.high)}.`
-        : withDrag() ? `${table.model === "vacuum" ? "The scene is in a vacuum" : `Model: ${table.model}`}; move any slider but the speed, and drag is left out.`
-          : state.density > 100 ? "In water drag and buoyancy matter: without them the answer is of little use." : "";
+      : isBeyond() ? `The table holds from ${speedText(table.low)} to ${speedText(table.high)}.`
+        : withDrag() ? `${state.density === 0 ? "The scene is in a vacuum" : `Model: ${table.model}`}; move any slider but the speed, and drag is left out.`
+          : "";
   $("back").hidden = !table || tabulated;
 }
 

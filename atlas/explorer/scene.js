@@ -195,7 +195,12 @@ function oneOf(values, section, names, what) {
   return given[0];
 }
 
-/** What the vacuum needs of a scene, in SI: {title, length, mass_per_length, fish_mass, radius, speed, gravity, density}. */
+/** Drag constant C of a cable in its fluid, Eq. (13c) of NRL Report 7048; 0 in a vacuum. */
+function dragConstant({ density, drag_coefficient, diameter, radius, mass_per_length, displaced_per_length }) {
+  return density ? 0.5 * density * drag_coefficient * diameter * radius / (mass_per_length + displaced_per_length) : 0;
+}
+
+/** What the vacuum needs of a scene, and what tells how much it leaves out, in SI; null for what a vacuum does not need. */
 function sceneOf(text, known) {
   const values = valuesOf(parseToml(text), known), gravity = values.gravity ?? GRAVITY;
   if (values["cable.library"]) throw new Error("cable.library is a file, which this page cannot open: give cable.mass_per_length");
@@ -218,9 +223,10 @@ function sceneOf(text, known) {
   for (const key of density ? ["cable.diameter", "cable.drag_coefficient"] : []) {
     if (!(key in values)) throw new Error(`${key} is missing: in a fluid the cable needs it for its drag`);
   }
-  const [radius, speed] = circleOf(values, gravity);
+  const [radius, speed] = circleOf(values, gravity), [mass_per_length, displaced_per_length] = cableMass(values, density, gravity);
   return {
-    title: values.title ?? "", length: values["cable.length"], mass_per_length: cableMass(values, density, gravity),
+    title: values.title ?? "", length: values["cable.length"], mass_per_length, displaced_per_length,
+    diameter: values["cable.diameter"] ?? null, drag_coefficient: values["cable.drag_coefficient"] ?? null,
     fish_mass: fishMass(values, density, gravity), radius, speed, gravity, density,
   };
 }
@@ -247,18 +253,19 @@ function circleOf(values, gravity) {
   return [radius, speed];
 }
 
+/** Mass of the cable and of the fluid that it displaces, over its length. */
 function cableMass(values, density, gravity) {
   const mass = values["cable.mass_per_length"], weight = values["cable.submerged_weight_per_length"];
-  if (mass !== undefined) {
-    if (weight !== undefined && !density) throw new Error("cable.mass_per_length and cable.submerged_weight_per_length are both the mass of the cable in a vacuum: keep one");
-    if (weight !== undefined && weight > mass * gravity) throw new Error("cable.submerged_weight_per_length is more than the weight of cable.mass_per_length");
-    return mass;
+  if (mass !== undefined && weight !== undefined) {
+    if (!density) throw new Error("cable.mass_per_length and cable.submerged_weight_per_length are both the mass of the cable in a vacuum: keep one");
+    if (weight > mass * gravity) throw new Error("cable.submerged_weight_per_length is more than the weight of cable.mass_per_length");
+    return [mass, mass - weight / gravity];
   }
-  if (weight === undefined) throw new Error("the mass of the cable is missing: give cable.mass_per_length");
-  const area = values["cable.displaced_area"] ?? 0.25 * Math.PI * values["cable.diameter"] ** 2;
-  const found = weight / gravity + (density ? density * area : 0);
+  if (mass === undefined && weight === undefined) throw new Error("the mass of the cable is missing: give cable.mass_per_length");
+  const area = values["cable.displaced_area"] ?? 0.25 * Math.PI * values["cable.diameter"] ** 2, displaced = density ? density * area : 0;
+  const found = mass ?? weight / gravity + displaced;
   if (!(found > 0)) throw new Error("cable.submerged_weight_per_length is more buoyancy than a cable without mass would have");
-  return found;
+  return [found, displaced];
 }
 
 function fishMass(values, density, gravity) {

@@ -6,7 +6,7 @@ const KNOT = 1852 / 3600;
 // Work above which shapes are not looked for in a page (workOf): some seconds; and for whole curves: less for each.
 const MOST_WORK = 2000, CURVE_WORK = 1000;
 const MOST_STATES = 40;
-const state = { scene: 0, model: "drag", picked: null, unit: "kn", length: 1, mass_per_length: 1, fish_mass: 0, radius: 1, speed: 1, gravity: GRAVITY, title: "", density: 0 };
+const state = { scene: 0, model: "drag", picked: null, unit: "kn", length: 1, mass_per_length: 1, fish_mass: 0, radius: 1, speed: 1, gravity: GRAVITY, title: "", density: 0, displaced_per_length: 0, diameter: null, drag_coefficient: null };
 // What sliders move about.
 const middle = {};
 const CABLE_KEYS = ["length", "mass_per_length", "fish_mass", "radius"];
@@ -15,6 +15,18 @@ const tableHere = () => known.tables[state.scene] ?? null;
 /** Whether the cable on show is that of the table. */
 const isTabulated = () => tableHere() !== null && [...CABLE_KEYS, "gravity"].every((key) => state[key] === tableHere().scene[key]);
 const withDrag = () => state.model === "drag" && isTabulated();
+/** Whether the speed lies beyond those of the table on show. */
+const isBeyond = () => withDrag() && !(tableHere().low <= state.speed && state.speed <= tableHere().high);
+
+// A fluid is dense where the cable displaces more than this share of its mass: `tolerance` of a scene that gives none.
+const NONDENSE = 0.01;
+/** What of the fluid the model on show leaves out. */
+function leftOut() {
+  const model = withDrag() ? tableHere().model : "vacuum", found = [];
+  if (state.density > 0 && model === "vacuum") found.push("drag");
+  if (model !== "water" && state.displaced_per_length > NONDENSE * state.mass_per_length) found.push("buoyancy");
+  return found;
+}
 
 function groups() {
   const { length, mass_per_length, fish_mass, radius, speed, gravity } = state, unit = Math.sqrt(radius * gravity);

@@ -33,6 +33,8 @@ TOLD = 5e-3
 LIKE, CLEAR = 0.1, 5.0
 # Whole numbers of two bytes, to the largest.
 STEPS = 32767
+# Of a scene, by the vacuum.
+NEEDED = ("title", "length", "mass_per_length", "fish_mass", "radius", "speed", "gravity", "density")
 # Digits of samples: a thousandth of a picture.
 DIGITS = 6
 
@@ -50,10 +52,11 @@ def table_of(scene: Scene, model: str | None = None) -> dict[str, Any]:
     Returns
     -------
     dict
-        For JSON, in SI. `scene`: what the vacuum needs. `branches`: samples, points where a branch begins, changes and
-        ends, and `shapes` at some of the speeds: x, y, z and tension at 49 points evenly along the cable from the tow
-        point down, as base64 of little-endian int16 over 32767: x and y in units of `width`, z in those of the length,
-        tensions in those of the largest of each. `rising`, `falling`: what is seen.
+        For JSON, in SI. `scene`: what the vacuum needs, and what tells how much it leaves out. `branches`: samples,
+        points where a branch begins, changes and ends, and `shapes` at some of the speeds: x, y, z and tension at 49
+        points evenly along the cable from the tow point down, as base64 of little-endian int16 over 32767: x and y in
+        units of `width`, z in those of the length, tensions in those of the largest of each. `rising`, `falling`: what
+        is seen.
 
     Raises
     ------
@@ -70,8 +73,8 @@ def table_of(scene: Scene, model: str | None = None) -> dict[str, Any]:
     return {
         "name": Path(scene.source).stem,
         "scene": {
-            name: getattr(scene, name)
-            for name in ("title", "length", "mass_per_length", "fish_mass", "radius", "speed", "gravity", "density")
+            name: None if (value := getattr(scene, name)) != value else value
+            for name in (*NEEDED, "displaced_per_length", "diameter", "drag_coefficient")
         },
         "model": found.model,
         "turn": scene.turn,

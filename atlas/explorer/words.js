@@ -22,14 +22,29 @@ function shapeTitle(shape) {
 
 /** What the cable does now: a sentence. */
 function nowText(shapes) {
-  const speed = `${digits(speedIn(state.speed, "kn"))} kn (${digits(speedIn(state.speed, "rpm"))} rpm)`;
+  const without = leftOut().length ? `, without ${leftOut().join(" and ")},` : "";
+  const speed = `${digits(speedIn(state.speed, "kn"))} kn (${digits(speedIn(state.speed, "rpm"))} rpm)${without}`;
   if (!shapes) return `At ${speed} this cable has too many shapes to be looked for in a page: towatlas lists them.`;
+  if (isBeyond()) return `At ${speed} no shape is tabulated: the table covers ${speedText(tableHere().low)} to ${speedText(tableHere().high)}.`;
   if (!shapes.length) return `At ${speed} no shape is tabulated.`;
   const one = shapes.find((shape) => shape.expected) ?? shapes[0];
   const many = shapes.length === 1 ? "the cable has one shape" : `the cable can take ${counted(shapes.length, "shape")}`;
   const lead = shapes.length === 1 ? "It has" : "The one to expect has";
   const where = `its fish ${lengthText(one.r_f)} from the axis and ${lengthText(one.z_f)} below the tow point`;
   return `At ${speed} ${many}. ${lead} ${nodesText(one.nodes)}, ${where}, and ${fateText(one)}.`;
+}
+
+/** How much the model on show leaves out of the fluid: a warning. */
+function warningText() {
+  const left = leftOut(), { gamma } = groups(), C = dragConstant(state), found = [];
+  if (!left.length) return "";
+  const unit = (state.mass_per_length + state.displaced_per_length) / state.mass_per_length;
+  if (left.includes("drag")) {
+    found.push(`the drag constant of the cable is C = ${digits(C, 2)} (0 in a vacuum), and its drag at the tow point is ${digits(C * gamma ** 2 * unit, 2)} times its weight`);
+  }
+  if (left.includes("buoyancy")) found.push(`the fluid takes ${digits(100 * (unit - 1), 2)} % off that weight`);
+  return `This answer leaves out ${left.join(" and ")}, and may be wrong: ${found.join("; ")}. `
+    + `The commands towatlas scene FILE and towatlas explore FILE include ${left.length > 1 ? "both" : "it"}.`;
 }
 
 function fateText(shape) {
@@ -46,6 +61,7 @@ const swingsText = ({ frequency }) => (frequency > 0 ? `, ${digits(frequency, 2)
 
 /** What comes next as the speed rises, and falls: a sentence. `states` are critical states without drag. */
 function thenText(states) {
+  if (isBeyond()) return "";
   if (withDrag()) {
     const table = tableHere(), up = nextSeen(table.rising, state.speed, true), down = nextSeen(table.falling, state.speed, false);
     return `Faster: ${up}. Slower: ${down}.`;
@@ -57,7 +73,7 @@ function thenText(states) {
   const speed = gamma * unit, here = stretchesOver(passed, 0, Infinity), k = here.findIndex((one) => one.low <= speed && speed < one.high);
   const begins = k >= 0 ? here[k + 1] : null;
   const up = begins && !(next && next.gamma * unit < begins.low) ? `from ${speedText(begins.low)} on it ${FATES[begins.kind]}`
-    : next ? `at ${speedText(next.gamma * unit)} (${percent(next)} more) two shapes with ${nodesText(next.n)} appear, and the cable may jump to one`
+    : next ? `at ${speedText(next.gamma * unit)} (${percent(next)} more) two other shapes begin, with ${nodesText(next.n)}; the one before goes on, and nothing there forces the cable off it`
     : "no further shapes appear that this page lists";
   const down = k > 0 ? `below ${speedText(here[k].low)} it ${FATES[here[k - 1].kind]}` : last ? `at ${speedText(last.gamma * unit)} (${percent(last)} less) this shape ends, and the cable must jump` : "the cable keeps its one shape";
   return `Faster: ${up}. Slower: ${down}.`;
@@ -67,7 +83,7 @@ function nextSeen(parts, speed, rises) {
   const items = groupsOf(parts), k = items.findIndex((item) => item.what === "stretch" && item.low <= speed && speed <= item.high);
   if (k < 0) return "this speed is not met on the way";
   const next = items[k + 1], end = rises ? items[k].high : items[k].low;
-  if (!next) return `the same to ${speedText(end)}, where the table ends`;
+  if (!next) return `no jump is seen as far as ${speedText(end)}, where the table ends`;
   return next.what === "jump" ? `at ${speedText(next.value)} ${seenText(next)}` : `from ${speedText(end)} on it ${seenText(next)}`;
 }
 
@@ -88,7 +104,8 @@ function groupsOf(parts) {
 
 function seenText(part) {
   if (part.what === "jump") return part.end < 0 ? "it jumps, and no shape lasts" : "it jumps";
-  const nodes = part.nodes[0] === part.nodes[1] ? nodesText(part.nodes[0]) : `${nodesText(part.nodes[0])} to ${nodesText(part.nodes[1])}`;
+  const [least, most] = [Math.min(...part.nodes), Math.max(...part.nodes)];
+  const nodes = least === most ? nodesText(most) : `${least ? WORDS[least] ?? least : "none"} to ${nodesText(most)}, by the speed`;
   if (part.kind === "flutter") {
     return `flutters about ${nodes}${doublingText(part.growth)}${swingsText(part)}`;
   }
@@ -105,10 +122,10 @@ function risingItems(states, low, high) {
   }
   const { unit } = groups(), edges = states.map((one) => one.gamma * unit).filter((speed) => speed < high);
   return [0, ...edges].flatMap((from, n) => {
-    const to = edges[n] ?? high, lead = n ? `${counted(2 * n + 1, "shape")}; a jump to one with ${nodesText(n)} is possible` : "one shape, without a node";
+    const to = edges[n] ?? high, lead = n ? `${counted(2 * n + 1, "shape")}; of the new two, with ${nodesText(n)}, the inner one` : "one shape, without a node";
     const parts = n ? stretchesOver(n, from, to) : [];
-    if (!parts.length) return [{ low: from, high: to, text: n ? `${lead}; ${KIND_LINES.rotation}` : lead, kind: n ? "rotation" : "stable" }];
-    return parts.map((part, k) => ({ ...part, text: `${k ? `the shape with ${nodesText(n)}` : `${lead}, which`} ${FATES[part.kind]}` }));
+    if (!parts.length) return [{ low: from, high: to, text: n ? `${lead} ${FATES.rotation}` : lead, kind: n ? "rotation" : "stable" }];
+    return parts.map((part, k) => ({ ...part, text: `${k ? `the shape with ${nodesText(n)}` : lead} ${FATES[part.kind]}` }));
   });
 }
 
