@@ -151,7 +151,8 @@ def draw_delays(axes: Axes) -> None:
             axes.loglog(1 / np.array(TURNS), late, marker, color=line.get_color(), mfc="none", label=f"{links} links")
             shown = ", ".join(f"{d:.4f} ({d / law(fold, r) / knot:.3f})" for d, r in zip(late, rates, strict=True))
             print(f"  {links} links, kn past its fold (over the law), turns {TURNS}: {shown}")
-    axes.set(xlabel="half knots a turn", ylabel="past the fold [kn]", title="How late a jump comes")
+    axes.set(xlabel="rise or fall of the speed in a turn [0.5 kn]", ylabel="past the fold [kn]")
+    axes.set_title("How late a jump comes")
     axes.legend()
 
 

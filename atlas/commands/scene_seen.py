@@ -66,7 +66,7 @@ def _sentence(found: SceneDiagram, parts: list[Stretch | Jump], rising: bool) ->
         begin, end = (ends[0].low, ends[1].high) if rising else (ends[0].high, ends[1].low)
         start = f"{_value(found, begin)} " if words else ""
         span = f"{start}to {_value(found, end)}" if after else f"from {_value(found, begin)} on"
-        span = span if after or words else f"from {_value(found, begin)} to {_value(found, end)}"
+        span = span if after or words else "throughout"
         words.append(f"{_what(stretches)} {span}{_weakly(found, stretches)}")
     return "; ".join(words)
 

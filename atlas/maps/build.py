@@ -195,9 +195,9 @@ def build_map(
             if not missing:
                 break
             report(f"{len(missing):,} of {count:,} tiles to do")
-            todo = _systems(spec, missing)
+            left = _systems(spec, missing)
             with progress_bar(_systems(spec, range(count)), "system", progress) as bar:
-                bar.update(bar.total - todo)
+                bar.update(bar.total - left)
                 run_tiles(folder, spec, missing, workers=workers, scheduler=scheduler, bar=bar)
         else:
             if _survey(folder, spec, known, progress):
