@@ -8,6 +8,7 @@ a line for each to docs/data/maps_chaos.csv. `--share 0.02` makes small ones.
 import argparse
 import csv
 import filecmp
+import math
 import os
 import signal
 import subprocess
@@ -64,8 +65,8 @@ class Row:
 
 
 def spec_of(medium: str, share: float, tile: int) -> tuple[str, int]:
-    """The text of a spec of about that share of the systems, and how many they are."""
-    some = max(2, round((SYSTEMS[medium] * share / 10.0) ** (1 / 3)))
+    """The text of a spec of that share of the systems or some more, and how many they are."""
+    some = max(2, math.ceil((SYSTEMS[medium] * share / 10.0) ** (1 / 3)))
     many = 10 * some
     return SPECS[medium].format(some=some, many=many, tile=tile), some * some * many
 
