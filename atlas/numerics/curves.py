@@ -197,14 +197,16 @@ def follow(equations: Equations, start: Array, tangent: Array, stop: Stop, steps
     """
     rows = len(start)
     z, tangent = start.copy(), tangent.copy()
-    step = np.zeros(rows)
+    step, bend = np.zeros(rows), np.zeros_like(start)
     active, complete = np.asarray(np.isfinite(start).all(axis=1)), np.zeros(rows, bool)
     history: list[list[tuple[Array, Array, Array]]] = [[] for _ in range(rows)]
     for _ in range(steps.points):
         i = np.flatnonzero(active)
         if not len(i):
             break
-        reached, jacobian, monitors, good, easy = _correct(equations, z[i], tangent[i], step[i], i, steps)
+        reached, jacobian, monitors, good, easy = _correct(
+            equations, _ahead(z[i], tangent[i], bend[i], step[i]), tangent[i], step[i], i, steps
+        )
         new = tangents(jacobian)
         along = np.sum(new * tangent[i], axis=1)
         new *= np.where(along < 0.0, -1.0, 1.0)[:, None]
@@ -217,6 +219,9 @@ def follow(equations: Equations, start: Array, tangent: Array, stop: Stop, steps
         complete[k] |= done
         for row, *entry in zip(k, z[k], new, monitors[good], strict=True):
             history[row].append(tuple(entry))  # type: ignore[arg-type]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turned = (new - tangent[k]) / step[k, None]
+        bend[k] = np.where(step[k, None] > 0.0, turned, 0.0)
         tangent[k] = new
         longer = step[k] * np.where(easy[good], steps.growth, 1.0)
         step[k] = np.where(step[k] == 0.0, steps.first, longer).clip(None, steps.longest)
@@ -234,11 +239,15 @@ def _curve(entries: list[tuple[Array, Array, Array]], unknowns: int, complete: b
     )
 
 
+def _ahead(z: Array, tangent: Array, bend: Array, step: Array) -> Array:
+    """A step along the parabolas through points."""
+    return z + step[:, None] * (tangent + 0.5 * step[:, None] * bend)
+
+
 def _correct(
-    equations: Equations, z: Array, tangent: Array, step: Array, rows: Integers, steps: Steps
+    equations: Equations, start: Array, tangent: Array, step: Array, rows: Integers, steps: Steps
 ) -> tuple[Array, Array, Array, Booleans, Booleans]:
-    """Step along the tangents and come back to the curve: points, Jacobians, monitors, success, and ease."""
-    start = z + step[:, None] * tangent
+    """Come back to the curve, across the tangents: points, Jacobians, monitors, success, and ease."""
     x = start.copy()
     count, unknowns = x.shape
     jacobian = np.full((count, unknowns - 1, unknowns), np.nan)

@@ -15,7 +15,7 @@ FAINT = 1e-6
 SLOWEST, FASTEST, DENSEST = 1e-5, 1e3, 30.0
 # Errors of shots may be so much larger than rounding: only how many nodes there are in the vacuum is asked for.
 LOOSENESS = 1e4
-STEPS = Steps(first=2.0, longest=4.0, shortest=1e-4, bent=0.1, straight=0.8, points=500)
+STEPS = Steps(first=2.0, longest=4.0, shortest=1e-4, near=1e-3, bent=0.1, straight=0.8, points=500)
 
 
 def numbers_of(x: Array, rows: Array, gamma: Array, heavy: bool) -> Integers:

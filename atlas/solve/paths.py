@@ -316,22 +316,35 @@ def solve_folds(path: Path, x: Array, t: Array) -> tuple[Array, Array, Array, Bo
     return z[:, 0], z[:, 1], error, solved
 
 
-def _meeting(path: Path, fewer: Column, more: Column) -> Fold | None:
-    """The fold in which a pair of one column meets before the other, if that is all that happens between them."""
+def _meetings(path: Path, between: list[tuple[Column, Column]]) -> list[Fold | None]:
+    """The folds in which a pair of one column meets before the other, where that is all that happens between them.
+
+    All are solved for at once: few shots leave lanes idle.
+    """
+    each = [_candidates(a, b) if len(a.x) < len(b.x) else _candidates(b, a) for a, b in between]
+    owner = np.repeat(np.arange(len(each)), [len(pairs) for pairs in each])
+    if not len(owner):
+        return [None] * len(between)
+    pairs = np.concatenate(each)
+    more = [a if len(a.x) > len(b.x) else b for a, b in between]
+    inner, outer = (np.array([more[i].x[pair + k] for i, pair in zip(owner, pairs, strict=True)]) for k in (0, 1))
+    guess = 0.5 * (inner + outer)
+    x, t, error, solved = solve_folds(path, guess, np.array([more[i].t for i in owner]))
+    low, high = (np.array([columns[k].t for columns in between])[owner] for k in (0, 1))
+    good = solved & (t >= low) & (t <= high) & (np.abs(x - guess) < outer - inner)
+    folds: list[Fold | None] = []
+    for i in range(len(between)):
+        found = np.flatnonzero(good & (owner == i))
+        k = int(found[0]) if len(found) == 1 else -1
+        folds.append(Fold(float(t[k]), float(x[k]), float(error[k]), int(pairs[k])) if k >= 0 else None)
+    return folds
+
+
+def _candidates(fewer: Column, more: Column) -> Integers:
+    """The first of each two shapes of a column without which it goes on as the other."""
     if len(more.x) != len(fewer.x) + 2:
-        return None
-    low, high = sorted((fewer.t, more.t))
-    pairs = np.array([k for k in range(len(more.x) - 1) if _goes_on(fewer, more, drop_b=k)], np.int64)
-    if not len(pairs):
-        return None
-    guess = 0.5 * (more.x[pairs] + more.x[pairs + 1])
-    x, t, error, solved = solve_folds(path, guess, np.full(len(pairs), more.t))
-    gap = more.x[pairs + 1] - more.x[pairs]
-    good = solved & (t >= low) & (t <= high) & (np.abs(x - guess) < gap)
-    if good.sum() != 1:
-        return None
-    k = int(np.flatnonzero(good)[0])
-    return Fold(float(t[k]), float(x[k]), float(error[k]), int(pairs[k]))
+        return np.empty(0, np.int64)
+    return np.array([k for k in range(len(more.x) - 1) if _goes_on(fewer, more, drop_b=k)], np.int64)
 
 
 def trace(path: Path, low: float, high: float, at: Array | None = None) -> Trace:
@@ -356,15 +369,16 @@ def trace(path: Path, low: float, high: float, at: Array | None = None) -> Trace
     folds: list[Fold | None] = [None] * (len(columns) - 1)
     for _ in range(ROUNDS):
         halved: list[int] = []
+        differing = [k for k, (a, b) in enumerate(pairwise(columns)) if open_[k] and len(a.x) != len(b.x)]
+        for k, fold in zip(differing, _meetings(path, [(columns[k], columns[k + 1]) for k in differing]), strict=True):
+            folds[k] = fold
         for k, (a, b) in enumerate(pairwise(columns)):
             if not open_[k]:
                 continue
             step = b.t - a.t
+            plain = folds[k] is not None
             if len(a.x) == len(b.x):
                 plain = _goes_on(a, b) and not _about_to(a, step) and not _about_to(b, -step)
-            else:
-                folds[k] = _meeting(path, a, b) if len(a.x) < len(b.x) else _meeting(path, b, a)
-                plain = folds[k] is not None
             if plain:
                 open_[k] = False
             elif step > NEAREST:
