@@ -92,8 +92,8 @@ def test_the_report_s_cable():
     assert 6.5 < folds.appears[2] < folds.ends[2] < 7.1
 
 
-# Derivatives from thirteen values H apart, exact to the twelfth order: with nine, 0.005 apart, the first was off by up to
-# 2e-13, and with smaller H the rounding of long doubles is as much.
+# Derivatives from thirteen values H apart, exact to the twelfth order: with nine, 0.005 apart, the first was off by up
+# to 2e-13, and with smaller H the rounding of long doubles is as much.
 FIRST = np.array([5, -72, 495, -2200, 7425, -23760, 0, 23760, -7425, 2200, -495, 72, -5], np.longdouble) / 27720
 SECOND = np.array([-50, 864, -7425, 44000, -222750, 1425600, 0], np.longdouble) / 831600
 SECOND = np.concatenate([SECOND[:6], [-2 * SECOND.sum()], SECOND[5::-1]])
