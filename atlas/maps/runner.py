@@ -29,6 +29,12 @@ TRIES = 4
 # How long a scheduler that is gone, or a cluster without workers, is waited for, s; how long workers of this machine
 # may take to come back before they are all started anew; and how often it is looked how many there are.
 GONE, BACK, LOOK = 120.0, 60.0, 2.0
+# What a worker of dask does by itself, and tiles do not need, takes a third of the time: memory is given back at each
+# small array and asked for again, and what runs is looked at a hundred times a second.
+LEAN = {
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
+    "distributed.worker.profile.enabled": False,
+}
 # What compiling may take, s.
 COMPILED = 900.0
 # Room that is left on a disk, bytes: for the file systems' own needs, and the next tile of each worker.
@@ -166,6 +172,7 @@ def _lost() -> tuple[type[BaseException], ...]:
 @contextmanager
 def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
     """A client of a cluster, or of processes of this machine, one thread each."""
+    from dask import config
     from distributed import Client, LocalCluster
 
     # That a scheduler or a worker is gone is dealt with here.
@@ -174,6 +181,7 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
         address: Any = scheduler
         try:
             if scheduler is None:
+                stack.enter_context(config.set(LEAN))
                 address = stack.enter_context(
                     LocalCluster(
                         n_workers=workers,
