@@ -150,6 +150,8 @@ def run(share: float, tile: int, cut: float, folder: Path) -> Row:
             time.sleep(0.2)
         if program.returncode:
             raise RuntimeError(f"the command ended with {program.returncode}")
+        if not was_cut:
+            raise RuntimeError("the map was done before the line was cut")
         took = time.monotonic() - began
     files, different = compare(folder / "alone", folder / "apart")
     return Row(systems, tiles, cut, round(took, 1), round(used[0], 1), round(used[1], 1), files, different)

@@ -29,8 +29,8 @@ TRIES = 4
 # How long a scheduler that is gone, or a cluster without workers, is waited for, s; how long workers of this machine
 # may take to come back before they are all started anew; and how often it is looked how many there are.
 GONE, BACK, LOOK = 120.0, 60.0, 2.0
-# What a worker of dask does by itself, and tiles do not need, takes a third of the time: memory is given back at each
-# small array and asked for again, and what runs is looked at a hundred times a second.
+# What a worker of dask does by itself, and tiles do not need, takes over a quarter of the time: memory is given back at
+# each small array and asked for again, and what runs is looked at a hundred times a second.
 LEAN = {
     "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
     "distributed.worker.profile.enabled": False,
