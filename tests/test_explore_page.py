@@ -105,6 +105,19 @@ def test_numbers_on_show_are_those_of_the_package(page):
         assert words == len(ours)
 
 
+def test_critical_speeds_do_not_depend_on_what_was_asked_before(page):
+    asked = "criticalStates(2.5, 0.3, {}, 40).map((one) => one.gamma)"
+    before = page.run(asked.format(0.5))
+    assert len(page.run(asked.format(9.0))) >= len(before)
+    page.run("criticalStates(20, 0.3, 9, 40)")
+    beyond = page.run("criticalStates(20, 0.3, 9, 40).map((one) => one.gamma)")
+    few = page.run("criticalStates(20, 0.3, 1, 40).map((one) => one.gamma)")
+    assert few == beyond[: len(few)]
+    assert len(few) < len(beyond)
+    assert sum(gamma > 1 for gamma in few) == 1
+    assert page.run(asked.format(0.5)) == before
+
+
 def test_windows_of_flutter_in_a_vacuum_are_those_of_the_package(page):
     page.run("document.getElementById('no-drag').click()")
     page.run(SETTLED)

@@ -257,10 +257,13 @@ let lastCable = { lam: NaN, wf: NaN, states: [] };
 function criticalStates(lam, wf, gamma, most) {
   if (lastCable.lam !== lam || lastCable.wf !== wf) lastCable = { lam, wf, states: [] };
   const { states } = lastCable, there = Math.min(transitions(lam, wf), most);
-  while (states.length < there && !(states.length >= 2 && states[states.length - 1].gamma > gamma)) {
-    const state = criticalState(lam, wf, states.length + 1);
+  // What is kept may reach beyond what is asked for now.
+  const found = [];
+  while (found.length < there && !(found.length >= 2 && found[found.length - 1].gamma > gamma)) {
+    const state = states[found.length] ?? criticalState(lam, wf, found.length + 1);
     if (!state) break;
-    states.push(state);
+    states[found.length] = state;
+    found.push(state);
   }
-  return [...states];
+  return found;
 }
