@@ -209,7 +209,7 @@ def build_map(
             for dim in ("shape", "fold")
         }
         digests = [known[number].digest for number in range(count)]
-        write_store(folder, spec, widths, digests)
+        write_store(folder, spec, widths, digests, progress)
     if netcdf is not None:
         merge(folder, spec, netcdf)
     return sum(one.failed for one in known.values())

@@ -93,7 +93,7 @@ def variables(spec: Spec) -> dict[str, Variable]:
         for axis in spec.cable_axes:
             about = {"long_name": f"{NAMES[axis.name]}, at random", "units": "1"}
             found[f"check_{axis.name}"] = Variable(CABLE, np.nan, about, stage="checks")
-        text = "error of the logarithm of speeds interpolated; inf where folds are others, missing where none are told"
+        text = "error of the logarithm of speeds looked up; inf where folds are others, missing where none are told"
         found["check_error"] = Variable(CABLE, np.nan, {"long_name": text, "units": "1"}, stage="checks")
     return found
 

@@ -120,13 +120,13 @@ class Map:
         Returns
         -------
         Folds
-            As of `towatlas.folds`, and as accurate: they are solved for from what is interpolated.
+            As of `towatlas.folds`, and as accurate.
 
         Raises
         ------
         ValueError
-            OutsideMap for a system or speeds outside the map, NotInMap where the points around have other folds; for
-            maps without folds and checks of them.
+            OutsideMap for a system or speeds outside the map, NotInMap where the map does not tell its folds; for maps
+            without folds and checks of them.
         """
         from towatlas.maps.folds import find_folds
 

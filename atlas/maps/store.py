@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from towatlas.builders.file import COMPRESSION, provenance
+from towatlas.builders.file import COMPRESSION, progress_bar, provenance
 from towatlas.cf import symbol_attributes
 from towatlas.maps.folds import check_errors
 from towatlas.maps.layout import Tiles, place_of, stages, variables
@@ -62,7 +62,7 @@ def whole_tile(folder: Path, number: int) -> tuple[Columns, str] | None:
     return found
 
 
-def write_store(folder: Path, spec: Spec, widths: dict[str, int], digests: list[str]) -> None:
+def write_store(folder: Path, spec: Spec, widths: dict[str, int], digests: list[str], progress: bool = False) -> None:
     """Put the tiles of a map together, and the store into place: there is none, or a whole one.
 
     Parameters
@@ -73,6 +73,8 @@ def write_store(folder: Path, spec: Spec, widths: dict[str, int], digests: list[
         Sizes of the dimensions "shape" and "fold".
     digests : list of str
         SHA-256 of the tiles, in order.
+    progress : bool
+        Whether a bar is drawn on a terminal.
 
     Raises
     ------
@@ -97,7 +99,7 @@ def write_store(folder: Path, spec: Spec, widths: dict[str, int], digests: list[
                 (column,) = padded([column], widths["shape" if stage == "shapes" else "fold"])
                 arrays[name][place] = column.reshape(*shape, *column.shape[1:])
         if spec.checks:
-            arrays["check_error"][:] = _measured(spec, temporary)
+            arrays["check_error"][:] = _measured(spec, temporary, progress)
             for name, column in spec.check_points().items():
                 arrays[f"check_{name}"][:] = column
         path = store_path(folder)
@@ -107,9 +109,12 @@ def write_store(folder: Path, spec: Spec, widths: dict[str, int], digests: list[
         shutil.rmtree(temporary, ignore_errors=True)
 
 
-def _measured(spec: Spec, path: Path) -> NDArray[np.float64]:
-    with xr.open_dataset(str(path), engine="zarr", chunks=None) as data:
-        return check_errors(spec, data)
+def _measured(spec: Spec, path: Path, progress: bool) -> NDArray[np.float64]:
+    with (
+        xr.open_dataset(str(path), engine="zarr", chunks=None) as data,
+        progress_bar(spec.checks, "check", progress) as bar,
+    ):
+        return check_errors(spec, data, bar.update)
 
 
 def _template(spec: Spec, widths: dict[str, int], digests: list[str], path: Path) -> None:

@@ -8,6 +8,8 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
+from towatlas.system import System
+
 Array = NDArray[np.float64]
 
 # Names in full of what a system and its speed are made of; the last three take the place of m_f, C_f and C_t.
@@ -180,3 +182,23 @@ class Spec:
             self.checks,
         ]
         return hashlib.sha256(json.dumps([axes, rest]).encode()).hexdigest()
+
+
+def system_of(numbers: dict[str, Array], i: int) -> tuple[System, float]:
+    """One system, and its speed, nan where there is none.
+
+    Parameters
+    ----------
+    numbers : dict of ndarray, shape (systems,)
+        Of `Spec.numbers`.
+    i : int
+
+    Returns
+    -------
+    System
+    float
+        [-].
+    """
+    given = {name: float(column[i]) for name, column in numbers.items()}
+    gamma = given.pop("gamma", np.nan)
+    return System.of(given.pop("lam"), given.pop("w_f"), **given), gamma

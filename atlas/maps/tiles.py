@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 from towatlas.effort import SECONDS, patience
 from towatlas.kernels import status
 from towatlas.maps.layout import CURVES, KINDS, place_of, variables
-from towatlas.maps.systems import Spec
+from towatlas.maps.systems import Spec, system_of
 from towatlas.results import Equilibria
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.folds import folds_in_speed
 from towatlas.solve.many import equilibria_many
 from towatlas.solve.shapes import shape_of
 from towatlas.solve.spectra import stability_many
-from towatlas.system import System
 
 Columns = dict[str, NDArray[Any]]
 Numbers = dict[str, NDArray[np.float64]]
@@ -141,7 +140,7 @@ def _states(spec: Spec, numbers: Numbers) -> Columns:
 
 def _expected(numbers: Numbers, count: NDArray[Any], r_f: NDArray[np.float64]) -> NDArray[np.int64]:
     """Which shape is expected to be seen: in a vacuum the median root, with drag the one nearest to the axis."""
-    vacuum = [_system(numbers, int(i))[0].in_vacuum if count[i] else False for i in range(len(count))]
+    vacuum = [system_of(numbers, int(i))[0].in_vacuum if count[i] else False for i in range(len(count))]
     nearest = np.where(np.isfinite(r_f), r_f, inf).argmin(axis=1)
     return np.where(vacuum, count // 2, nearest).astype(np.int64)
 
@@ -154,7 +153,7 @@ def _curves(spec: Spec, numbers: Numbers, count: NDArray[Any], width: int) -> Co
     """Positions and tensions along the cables."""
     out = {name: np.full((len(count), width, spec.stations), np.nan) for name in CURVES}
     for i in np.flatnonzero(count > 0):
-        system, gamma = _system(numbers, int(i))
+        system, gamma = system_of(numbers, int(i))
         found = solve_equilibria(system, gamma)
         if len(found) != count[i]:
             continue
@@ -173,17 +172,11 @@ def _curve(found: Equilibria, k: int, s: NDArray[np.float64]) -> dict[str, Any]:
     return {name: curve[name].values for name in CURVES}
 
 
-def _system(numbers: Numbers, i: int) -> tuple[System, float]:
-    given = {name: float(column[i]) for name, column in numbers.items()}
-    gamma = given.pop("gamma", np.nan)
-    return System.of(given.pop("lam"), given.pop("w_f"), **given), gamma
-
-
 def _folds(spec: Spec, numbers: Numbers) -> Columns:
     assert spec.span is not None
     low, high = sorted(spec.span, key=abs)
     named = "origin" in spec.fields
-    found = [folds_in_speed(_system(numbers, i)[0], low, high, named) for i in range(len(numbers["lam"]))]
+    found = [folds_in_speed(system_of(numbers, i)[0], low, high, named) for i in range(len(numbers["lam"]))]
     columns: dict[str, list[NDArray[Any]]] = {
         "fold_gamma": [one.gamma for one in found],
         "fold_r_f": [one.r_f for one in found],
