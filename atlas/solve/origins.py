@@ -15,6 +15,8 @@ FAINT = 1e-6
 SLOWEST, FASTEST, DENSEST = 1e-5, 1e3, 30.0
 # Errors of shots may be so much larger than rounding: only how many nodes there are in the vacuum is asked for.
 LOOSENESS = 1e4
+# Of logarithms, for differences.
+BESIDE = 1e-6
 STEPS = Steps(first=2.0, longest=4.0, shortest=1e-4, near=1e-3, bent=0.1, straight=0.8, points=500)
 
 
@@ -57,20 +59,19 @@ def _follow(start: Array, empty: Array, fluid: Array, sign: Array, faint: Array)
     start, empty, fluid, sign, faint = (np.concatenate([one, one]) for one in (start, empty, fluid, sign, faint))
     way = np.repeat([-1.0, 1.0], folds)
     n = np.zeros(folds, np.int64)
-    jets = jets_of(2, gamma=True, parameter=True)
-    at = jets.at
+    jets = jets_of(1)
 
     def equations(z: Array, i: Integers) -> tuple[Array, Array, Array, Booleans]:
-        share = np.exp(z[:, 2])[:, None]
-        rows, moved = empty[i] + share * fluid[i], share * fluid[i]
-        ends = shoot(np.exp(z[:, 0]), sign[i] * np.exp(z[:, 1]), rows, jets, directions=moved, looseness=LOOSENESS)
-        jet = ends.log_rho
-        value = np.stack([jet[:, 0], jet[:, at(1, 0, 0)]], axis=1)
-        along_value = np.stack([value[:, 1], jet[:, at(0, 1, 0)], jet[:, at(0, 0, 1)]], axis=1)
-        along_slope = np.stack([2.0 * jet[:, at(2, 0, 0)], jet[:, at(1, 1, 0)], jet[:, at(1, 0, 1)]], axis=1)
-        sound = (ends.status == status.OK) & np.isfinite(jet).all(axis=1) & (rows[:, W] > -1.0)
-        nodes = np.floor(ends.angle / np.pi + 0.5)
-        return value, np.stack([along_value, along_slope], axis=1), nodes[:, None], sound
+        # At a point and beside it: four slopes take a fraction of the time of one jet with all derivatives.
+        every = np.concatenate([z, *(z + BESIDE * unit for unit in np.eye(3))])
+        k = np.tile(i, 4)
+        rows = empty[k] + np.exp(every[:, 2])[:, None] * fluid[k]
+        ends = shoot(np.exp(every[:, 0]), sign[k] * np.exp(every[:, 1]), rows, jets, looseness=LOOSENESS)
+        value, *beside = ends.log_rho[:, :2].reshape(4, len(z), 2)
+        jacobian = (np.stack(beside, axis=2) - value[:, :, None]) / BESIDE
+        known = (ends.status == status.OK) & np.isfinite(ends.log_rho).all(axis=1) & (rows[:, W] > -1.0)
+        nodes = np.floor(ends.angle[: len(z)] / np.pi + 0.5)
+        return value, jacobian, nodes[:, None], known.reshape(4, -1).all(axis=0)
 
     def stop(z: Array, direction: Array, nodes: Array, i: Integers) -> Booleans:
         arrived = z[:, 2] < faint[i]
