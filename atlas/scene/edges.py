@@ -118,7 +118,7 @@ def _edges(answer: SceneAnswer, model: str, low: float, high: float) -> FlutterE
         x = float(np.log(shapes.r_f[shapes.expected] * gamma**2))
         samples, began, ended = follower.through(traced, t, x, _decided)
     first, last = samples[0].t, samples[-1].t
-    spans = _merged(follower.modes(samples, began, ended))
+    spans = _merged([mode for mode in follower.modes(samples, began, ended) if follower.is_strong(mode)])
     unit = scene.speed_of(1.0)
 
     def edge(at: float, rate: float, enters: bool) -> FlutterEdge:
@@ -160,10 +160,10 @@ Span = tuple[float, float, dict[float, float]]
 
 
 def _merged(modes: list[Mode]) -> list[Span]:
-    """Where a shape flutters: begins, ends, and those of the two that are edges with the frequency there."""
-    strong = [mode for mode in modes if max(sigma.real for sigma in mode.sigma) >= WEAK]
+    """Where a shape flutters, by modes that are not weak: begins, ends, and which of both are edges, with the frequency
+    there."""
     spans: list[Span] = []
-    for mode in sorted(strong, key=lambda mode: mode.start.t):
+    for mode in sorted(modes, key=lambda mode: mode.start.t):
         edges = {edge.t: edge.frequency for edge in (mode.start, mode.end) if edge.kind in ("hopf", "krein")}
         if spans and mode.start.t <= spans[-1][1]:
             start, end, known = spans[-1]

@@ -12,8 +12,10 @@ from towatlas.kernels.system import LAM
 from towatlas.numerics.rows import EPS
 from towatlas.results_motion import Window
 from towatlas.solve.growth import WEAK, Spectrum, has_drag, reach_of
+from towatlas.solve.looks import SLOPE
 from towatlas.solve.motion import Complex, Motion, motions
 from towatlas.solve.paths import Fold, Path, Trace, trace
+from towatlas.solve.shots import Array
 from towatlas.solve.spectrum import CLOSE, polish, together
 from towatlas.system import System
 
@@ -26,6 +28,8 @@ SETTLED = 1e-13
 # Circle around two modes that meet without drag, and how far a mode may move from one sample to the next, in units of
 # Omega.
 CIRCLE, FAR = 0.05, 0.2
+# So near to what is weak growth is looked at between samples.
+ALMOST = 0.9
 REMEDY = "a narrower range, a lower speed or a shorter cable has fewer shapes to look at"
 
 
@@ -63,7 +67,7 @@ class Mode:
 def followed(
     system: System, low: float, high: float, *, gamma: float | None = None, at: float | None = None
 ) -> "tuple[Trace, Follower]":
-    """All shapes between two speeds, or two lengths, close enough for windows, and what follows their modes.
+    """All shapes between two speeds, or two lengths, and what follows their modes.
 
     Parameters
     ----------
@@ -73,7 +77,8 @@ def followed(
     gamma : float, optional
         The speed, > 0, where it is the length that moves [-].
     at : float, optional
-        A value between them to be among those that are looked at.
+        A value between them to be among those that are looked at, for `through`; without it they are close enough for
+        windows.
 
     Returns
     -------
@@ -85,10 +90,8 @@ def followed(
     else:
         path = Path(replace(system, lam=low).row(), gamma, ("lam",))
     end = float(np.log(high / low))
-    count = int(np.ceil(end / np.log1p(SPACING))) + 1
-    values = np.linspace(0.0, end, max(2, count))
-    traced = trace(path, 0.0, end, at=values if at is None else np.union1d(values, np.log(at / low)))
-    return traced, Follower(system, path)
+    values = np.linspace(0.0, end, _steps(end) + 1) if at is None else np.array([np.log(at / low)])
+    return trace(path, 0.0, end, at=values), Follower(system, path)
 
 
 class Follower:
@@ -136,26 +139,41 @@ class Follower:
         i = int(np.argmin([abs(column.t - t) for column in columns]))
         k = int(np.argmin(np.abs(columns[i].x - x)))
         places = next(places for places in _places(traced) if (i, k) in places)
-        order = sorted(range(len(places)), key=lambda j: abs(columns[places[j][0]].t - t))
+        points = self._points(traced, places)
+        order = sorted(range(len(points)), key=lambda j: abs(points[j][0] - t))
         samples: dict[int, Sample] = {}
         for j in order:
             way = [samples[m] for m in samples if (m - order[0]) * (j - order[0]) >= 0]
             if way and enough(way):
                 continue
             try:
-                check_patience("growth rates along the branch", REMEDY, done=len(samples), of=len(places))
-                at, place = places[j]
-                samples[j] = self.sample(columns[at].t, float(columns[at].x[place]), place)
+                check_patience("growth rates along the branch", REMEDY, done=len(samples), of=len(points))
+                samples[j] = self.sample(*points[j])
             except TooMuchWork:
                 if not samples:
                     raise
                 break
         found = [samples[j] for j in sorted(samples)]
         began, ended = _folds(traced, places)
-        return found, began if 0 in samples else None, ended if len(places) - 1 in samples else None
+        return found, began if 0 in samples else None, ended if len(points) - 1 in samples else None
+
+    def _points(self, traced: Trace, places: list[tuple[int, int]]) -> list[tuple[float, float, int]]:
+        """t, x and place of the shapes of a branch, close enough for windows: of columns, and between them."""
+        columns = traced.columns
+        known = [(columns[i].t, float(columns[i].x[k]), k, float(columns[i].moves[k])) for i, k in places]
+        points = [(t, x, k) for t, x, k, _ in known]
+        for (t, x, k, moves), (later, y, _, moved) in pairwise(known):
+            step = later - t
+            share = np.arange(1, _steps(step)) / _steps(step)
+            # The cubic through both.
+            bent = (1.0 - share) * (moves * step - (y - x)) + share * ((y - x) - moved * step)
+            guess = x + share * (y - x) + share * (1.0 - share) * bent
+            at = t + share * step
+            points += zip(at, self._offsets(guess, at), [k] * len(at), strict=True)
+        return sorted(points)
 
     def sample(self, t: float, x: float, place: int) -> Sample:
-        ends = self.path.shots(np.array([x]), np.array([t]), self.path.jets(1))
+        ends = self.path.shots(np.array([x]), np.array([t]), SLOPE)
         nodes = int(np.floor(ends.angle[0] / np.pi + 0.5))
         r_f = float(np.exp(x) / self.speed(t) ** 2)
         return Sample(t, x, nodes, place, Spectrum(self.system_at(t), self.speed(t), r_f))
@@ -165,15 +183,21 @@ class Follower:
         return self.sample(t, self.offset(a, b, t), a.place)
 
     def offset(self, a: Sample, b: Sample, t: float) -> float:
-        """Log of the radius of the fish of that shape, by Newton's method."""
+        """Log of the radius of the fish of that shape."""
         x = a.x + (t - a.t) / (b.t - a.t) * (b.x - a.x)
+        return float(self._offsets(np.array([x]), np.array([t]))[0])
+
+    def _offsets(self, x: Array, t: Array) -> Array:
+        """Log of the radius of the fish of shapes near by, by Newton's method."""
+        x, going = x.copy(), np.arange(len(x))
         for _ in range(ROUNDS):
-            along, _, sound = self.path.log_rho(np.array([x]), np.array([t]), 1)
-            step = float(along[0, 0] / along[0, 1])
-            if not sound[0] or not np.isfinite(step):
-                break
-            x -= step
-            if abs(step) < 8.0 * EPS:
+            ends = self.path.shots(x[going], t[going], SLOPE)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                step = ends.log_rho[:, 0] / ends.log_rho[:, 1]
+            sound = (ends.status == status.OK) & np.isfinite(step)
+            x[going[sound]] -= step[sound]
+            going = going[sound & (np.abs(step) >= 8.0 * EPS)]
+            if not len(going):
                 break
         return x
 
@@ -311,6 +335,15 @@ class Follower:
             weak=growth < WEAK * self.speed(sample.t),
         )
 
+    def is_strong(self, mode: Mode) -> bool:
+        """Whether it grows somewhere by so much that it is not weak, if only between samples."""
+        rates = [sigma.real for sigma in mode.sigma]
+        k = int(np.argmax(rates))
+        if not ALMOST * WEAK < rates[k] < WEAK:
+            return rates[k] >= WEAK
+        sample, growth = self._summit(mode, mode.samples[k], rates[k] * self.speed(mode.samples[k].t))
+        return growth >= WEAK * self.speed(sample.t)
+
     def _summit(self, mode: Mode, sample: Sample, growth: float) -> tuple[Sample, float]:
         """The largest growth between samples, where a parabola through three of them has its vertex."""
         k = mode.samples.index(sample)
@@ -339,6 +372,11 @@ class Follower:
         if sample.nodes == 0:
             return "outward"
         return f"{sample.nodes} {'outer' if sample.spectrum.index % 2 else 'inner'}"
+
+
+def _steps(length: float) -> int:
+    """Into how many parts a stretch of t is cut."""
+    return max(1, int(np.ceil(length / np.log1p(SPACING))))
 
 
 def _places(traced: Trace) -> list[list[tuple[int, int]]]:

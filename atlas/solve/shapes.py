@@ -13,7 +13,7 @@ from towatlas.kernels import status
 from towatlas.numerics.rows import bracket
 from towatlas.results import Equilibria
 from towatlas.solve.equilibria import solve_equilibria
-from towatlas.solve.jets import jets_of
+from towatlas.solve.looks import SLOPE
 from towatlas.solve.members import shoot_singly
 from towatlas.solve.shots import shoot
 from towatlas.system import System
@@ -196,7 +196,7 @@ def _drag_line(found: Equilibria, k: int) -> Line:
 
     def line(height: Array) -> Array:
         radius = np.full(len(height), found.r_f[k] * gamma2)
-        ends = shoot(radius, found.gamma, system.row(), jets_of(0), shares=height / system.lam)
+        ends = shoot(radius, found.gamma, system.row(), SLOPE, shares=height / system.lam)
         if (ends.status != status.OK).any():
             raise ArithmeticError(f"{system}, gamma = {found.gamma:g}: {status.SENTENCES[int(ends.status.max())]}")
         columns = (ends.X, ends.Y, ends.H, ends.FX, ends.FY, ends.FZ, ends.T)
