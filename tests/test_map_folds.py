@@ -61,7 +61,7 @@ def system(C, lam, **changes):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("folds") / "map"
-    assert build_map(make_spec(SPEC), folder) == 0
+    assert build_map(make_spec(SPEC), folder, netcdf=folder.with_suffix(".nc")) == 0
     return folder
 
 
@@ -207,6 +207,7 @@ def test_scene(capsys, monkeypatch, folder):
     assert with_map["jumps_searched"].startswith("gamma 0.03 to 5 by a map")
     assert [(row["n"], row["origin"]) for row in with_map["jumps"]] == [(1, "vacuum")]
     assert [row["gamma"] for row in with_map["jumps"]] == pytest.approx(direct.gamma, rel=2.0 * direct.error[0])
+    assert ask(2.0, "--atlas", folder.with_suffix(".nc"))[0] == with_map
     outside, said = ask(2.6, "--atlas", folder)
     assert "not looked up: lam = 2.6 is outside the map" in said
     assert outside["jumps_complete"]

@@ -45,8 +45,8 @@ def add(commands: Any) -> None:
     parser.add_argument(
         "--atlas",
         type=Path,
-        metavar="DIR",
-        help="look them up in a map of folds, by `towatlas map`, and compute nothing",
+        metavar="MAP",
+        help="look them up in a map of folds, DIR or FILE by `towatlas map`",
     )
     add_patience(parser)
     parser.add_argument("--json", action="store_true", help="a list of objects instead of a table")

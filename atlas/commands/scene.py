@@ -29,7 +29,7 @@ from towatlas.scene.sensitivities import sensitivities_of
 from towatlas.scene.verdicts import verdicts_of
 from towatlas.system import System
 from towatlas.tables.atlas import Atlas, open_atlas
-from towatlas.tables.file import default_path
+from towatlas.tables.file import default_path, is_map
 
 MEDIA = {"vacuum": "a vacuum", "air": "a nondense fluid", "water": "a dense fluid"}
 # Of an equilibrium: names in JSON, and what the table calls them.
@@ -83,7 +83,7 @@ def add(commands: Any) -> None:
         metavar="LOW:HIGH",
         help="also what is seen as the speed rises from LOW to HIGH, as 1kn:8kn, and falls back; takes longer",
     )
-    add_atlas(parser, "; or DIR of a map of folds, in which jumps with drag are looked up")
+    add_atlas(parser, "; or a map of folds, DIR or FILE, in which jumps with drag are looked up")
     where = parser.add_mutually_exclusive_group()
     where.add_argument("--json", action="store_true", help="one object instead of tables, with all of it")
     where.add_argument(
@@ -124,7 +124,7 @@ def atlas_if_any(path: Path | None) -> Atlas | None:
 
     Where a map is named critical speeds are looked up in that of always.
     """
-    if path is not None and path.is_dir():
+    if path is not None and is_map(path):
         path = None
     if path is None and not default_path().exists():
         return None
@@ -133,7 +133,7 @@ def atlas_if_any(path: Path | None) -> Atlas | None:
 
 def _finder(path: Path | None) -> Finder:
     """What finds jumps with drag: a map, where one is named and tells them, else the solver."""
-    if path is None or not path.is_dir():
+    if path is None or not is_map(path):
         return solve_jumps
     from towatlas.maps.folds import NotInMap
     from towatlas.maps.lookup import OutsideMap, open_map

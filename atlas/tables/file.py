@@ -1,5 +1,6 @@
 """Reading a file of towatlas: its bytes, checked against their seal, as NetCDF. Needs numpy and netCDF4 only."""
 
+import mmap
 import os
 import threading
 from collections.abc import Iterator
@@ -86,6 +87,27 @@ def default_path() -> Path:
             f"{VARIABLE} names {path}, where there is no file: unset it, or `towatlas build` puts an atlas there"
         )
     return SHIPPED if SHIPPED.exists() else path
+
+
+def is_map(path: Path) -> bool:
+    """Whether a map is there, by `towatlas map`, and no atlas.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    bool
+    """
+    if path.is_dir():
+        return True
+    try:
+        # Before anything is known of the file: not by the NetCDF library, which is not safe with damaged ones.
+        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+            return data.find(b"tiles_sha256") >= 0
+    except (OSError, ValueError):
+        return False
 
 
 def _dataset(path: Path, data: bytes) -> "netCDF4.Dataset":
