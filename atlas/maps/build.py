@@ -27,7 +27,7 @@ from towatlas.maps.tiles import compute_tile
 from towatlas.tables.seal import AtlasFileError
 
 # Of an estimate: tiles that are looked into, neighbouring systems of each, and CPU time after which no more are, s.
-SAMPLED, NEIGHBOURS, ENOUGH = 12, 8, 5.0
+SAMPLED, NEIGHBOURS, ENOUGH = 40, 8, 5.0
 # Rooms of the package that compute tiles; figures, commands and the like may change between a start and --resume.
 ROOMS = ("", "maps", "numerics", "solve")
 # By stage: what has a status, and what there is of each shape or fold.
