@@ -103,8 +103,8 @@ def digest(code: bytes) -> bytes:
     return hashlib.sha256(b"towatlas kernel" + code).digest()
 
 
-def _write_sealed(path: Path, content: bytes) -> None:
-    """Write code behind its digest; at once, so that nobody reads half of it."""
+def write_sealed(path: Path, content: bytes) -> None:
+    """Write what is kept behind its digest; at once, so that nobody reads half of it."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=path.name)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -116,7 +116,7 @@ def _write_sealed(path: Path, content: bytes) -> None:
         raise
 
 
-def _read_sealed(path: Path) -> bytes | None:
+def read_sealed(path: Path) -> bytes | None:
     """What a file holds; None where there is none, or none that is whole."""
     try:
         content = path.read_bytes()
@@ -131,7 +131,7 @@ def _read_sealed(path: Path) -> bytes | None:
 
 
 def _throw_away(path: Path) -> None:
-    print(f"towatlas: {path} is damaged: compiling it again", file=sys.stderr)
+    print(f"towatlas: {path} is damaged: making it again", file=sys.stderr)
     with suppress(OSError):
         shutil.rmtree(path) if path.is_dir() else path.unlink()
 
@@ -189,7 +189,7 @@ class Kernel:
     def _load(self) -> Callable[[bytes], int]:
         with self._loading:
             if self._run is None:
-                code = _read_sealed(self.path)
+                code = read_sealed(self.path)
                 run = None if code is None else self._link(code)
                 if code is not None and run is None:
                     _throw_away(self.path)
@@ -265,7 +265,7 @@ def warm(groups: Sequence[Sequence[Kernel]], done: Callable[[Kernel], object]) -
         )
 
     def some(group: Sequence[Kernel]) -> None:
-        missing = [kernel for kernel in group if _read_sealed(kernel.path) is None]
+        missing = [kernel for kernel in group if read_sealed(kernel.path) is None]
         if missing:
             build(missing)
         for kernel in group:
@@ -298,5 +298,5 @@ def build(kernels: Sequence[Kernel]) -> list[bytes]:
         if folder() is not None:
             # On a full disk, say, it is compiled again the next time.
             with suppress(OSError):
-                _write_sealed(kernel.path, parts[-1])
+                write_sealed(kernel.path, parts[-1])
     return parts

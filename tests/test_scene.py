@@ -421,3 +421,30 @@ def test_lists_are_arrays_of_one_length():
     jumps = critical_speeds(lam=30.0, w_f=1.0, gamma=1.0)
     columns = jumps.n, jumps.gamma, jumps.error, jumps.looked_up, jumps.status, jumps.near(1.0)
     assert {len(column) for column in columns} == {len(jumps.n)} != {0}
+
+
+def test_units_that_were_read_before_are_read_without_pint(tmp_path, capfd):
+    """The same bits, from a file that is made anew where it is damaged, and done without where it cannot be written."""
+    code = (
+        "import sys; from towatlas.scene.units import parse_quantity as parse;"
+        "print(parse('key', '0.1824 g/ft', 'kg/m').hex(), 'pint' in sys.modules)"
+    )
+
+    def ask(**more):
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=os.environ | more, capture_output=True, text=True, check=True
+        )
+        return done.stdout.split(), done.stderr
+
+    place = {"NUMBA_CACHE_DIR": str(tmp_path)}
+    factor = (0.1824 * 0.001 / 0.3048).hex()
+    first, said = ask(**place)
+    assert (first[1], said) == ("True", "")
+    assert float.fromhex(first[0]) == pytest.approx(float.fromhex(factor), rel=4e-16)
+    assert ask(**place) == ([first[0], "False"], "")
+    (kept,) = (tmp_path / "towatlas").glob("units-*.json")
+    kept.write_bytes(kept.read_bytes().replace(b"0.00", b"0.01"))
+    again, said = ask(**place)
+    assert (again, "is damaged: making it again" in said) == (first, True)
+    assert ask(**place) == ([first[0], "False"], "")
+    assert ask(NUMBA_CACHE_DIR="/dev/null") == (first, "")

@@ -1,13 +1,18 @@
 """Quantities with units as people write them, in SI: "0.1824 g/ft", "11/16 in", "3 kn"; a bare number is SI."""
 
 import functools
+import json
 import math
 import re
+import zlib
+from contextlib import suppress
 from fractions import Fraction
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 from towatlas.checks import short
-from towatlas.kernels.native import cache_root
+from towatlas.kernels.native import cache_root, read_sealed, write_sealed
 
 # Number, unit. The number may be a fraction, "11/16", or a mixed one, "1 1/2".
 _DECIMAL = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -33,6 +38,8 @@ _AMBIGUOUS = {
     "nm": "a nanometre or a nautical mile: write nanometer or nmi",
     "gr": "a grain or a gram: write grain or g",
 }
+# Factors kept on the disk.
+_MOST_KEPT = 1000
 # What a number with units may be for; the message names it. Angles are told from pure numbers, see `_same`.
 _KINDS = {
     "m": "a length",
@@ -66,6 +73,24 @@ def _registry() -> Any:
     for names in _ALIASES:
         registry.define(f"@alias {names}")
     return registry
+
+
+def _kept() -> Path:
+    names = zlib.crc32(" ".join(_ALIASES).encode())
+    return cache_root() / f"units-{version('pint')}-{names:08x}.json"
+
+
+@functools.cache
+def _factors() -> dict[str, float]:
+    """Factors to SI that pint has told before, by unit and SI unit: who knows them needs no pint."""
+    content = read_sealed(_kept())
+    return {} if content is None else json.loads(content)
+
+
+def _keep(known: dict[str, float]) -> None:
+    with suppress(OSError):
+        _kept().parent.mkdir(parents=True, exist_ok=True)
+        write_sealed(_kept(), json.dumps(known).encode())
 
 
 def _same(one: Any, other: Any) -> bool:
@@ -230,8 +255,6 @@ def _decimal(text: str) -> Fraction:
 
 
 def _convert(name: str, value: Any, number: float, symbol: str, unit: str, twin: str | None) -> float:
-    registry = _registry()
-    wanted = registry.Quantity(1.0, unit)
     for word in re.findall(r"[^\W\d_]+", symbol):
         if word in _AMBIGUOUS:
             raise ValueError(f"{name} = {short(value)}: {word} may be {_AMBIGUOUS[word]}")
@@ -239,6 +262,23 @@ def _convert(name: str, value: Any, number: float, symbol: str, unit: str, twin:
     if many is not None:
         number, symbol = number / int(many[1]), f"{symbol[: many.start()]}/{symbol[many.end() :]}"
     symbol = _BARE_POWER.sub(r"^\1", symbol)
+    known, key = _factors(), f"{symbol} in {unit}"
+    factor = known.get(key)
+    if factor is None:
+        factor = _factor(name, value, symbol, unit, twin)
+        if len(known) < _MOST_KEPT:
+            known[key] = factor
+            _keep(dict(known))
+    converted = number * factor
+    if not math.isfinite(converted):
+        raise ValueError(f"{name} = {short(value)} is not finite")
+    return converted
+
+
+def _factor(name: str, value: Any, symbol: str, unit: str, twin: str | None) -> float:
+    """How many of an SI unit another is."""
+    registry = _registry()
+    wanted = registry.Quantity(1.0, unit)
     try:
         if _UNIT.fullmatch(symbol) is None:
             raise ValueError
@@ -248,10 +288,7 @@ def _convert(name: str, value: Any, number: float, symbol: str, unit: str, twin:
         raise ValueError(f"{name} = {short(value)}: unit {symbol!r} is unknown; write it as {_sample(unit)}") from None
     if not given._is_multiplicative or not same:
         raise ValueError(f"{name} = {short(value)} is not {_KINDS[unit]}{_hint(symbol, given, unit, twin)}")
-    converted = float((number * given).to(wanted.units).magnitude)
-    if not math.isfinite(converted):
-        raise ValueError(f"{name} = {short(value)} is not finite")
-    return converted
+    return float(given.to(wanted.units).magnitude)
 
 
 def _hint(symbol: str, given: Any, unit: str, twin: str | None) -> str:
