@@ -9,6 +9,8 @@ from test_stability import AIR, galerkin, motion_of
 
 import towatlas
 from benchmarks.stability import CASES, reference
+from towatlas.solve.equilibria import solve_equilibria
+from towatlas.solve.growth import Spectrum
 from towatlas.solve.motion import BOUND, motions
 from towatlas.solve.spectrum import polish, together
 from towatlas.system import System
@@ -119,3 +121,19 @@ def test_a_light_fish_whose_cable_soon_carries_itself():
     assert abs(leading - exact) < 1e-14 * abs(exact)
     # Of the tension over that of the fish: the last step begins with a hundred times as much.
     assert coarse.series[-1, 0, 0] > 100.0 * coarse.series[0, 0, 0]
+
+
+def test_slow_growth_beside_a_fold_where_drag_is_strong():
+    """Galerkin's method has no guess of it: 8.2 km of cable in sea water. Growth is the square root of the distance."""
+    system = System.of(2.69, 0.0496072, m_f=0.0720328, C=43719.3, C_f=18.688, w=0.549383)
+    fold = towatlas.folds(2.69, 0.0496072, (0.014, 0.016), m_f=0.0720328, C=43719.3, C_f=18.688, w=0.549383)
+    low, high = fold.gamma
+    apart = np.array([1e-6, 1e-4])
+    for gamma in (low * (1.0 + apart), high * (1.0 - apart)):
+        growth = []
+        for speed in gamma:
+            shapes = solve_equilibria(system, speed)
+            spectra = [Spectrum(system, speed, r_f) for r_f in shapes.r_f]
+            assert [(one.status, one.unstable) for one in spectra] == [(0, 0), (0, 1), (0, 0)]
+            growth.append(spectra[1].roots.sigma[0].real)
+        assert growth[1] / growth[0] == pytest.approx(10.0, rel=0.05)

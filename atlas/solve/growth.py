@@ -7,7 +7,7 @@ from towatlas.effort import check_patience
 from towatlas.kernels import status
 from towatlas.solve.galerkin import Modes, modes
 from towatlas.solve.motion import Array, Complex, Motion, motions
-from towatlas.solve.spectrum import Roots, zeros_near
+from towatlas.solve.spectrum import Roots, growing_real, zeros_near
 from towatlas.solve.winding import count_growing
 from towatlas.system import System
 
@@ -221,6 +221,15 @@ class Spectrum:
         else:
             damped = -np.inf
             roots = self._slowest(motion, guesses)
+        rest = sigma[near & (sigma.real <= damped)]
+        if self._all_inside(motion, roots, rest):
+            return True
+        # Where drag is strong Galerkin's method is no guess of what grows slowly beside a fold.
+        more = growing_real(motion, roots)
+        return len(more) > len(roots) and self._all_inside(motion, more, rest)
+
+    def _all_inside(self, motion: Motion, roots: Roots, rest: Complex) -> bool:
+        """Whether there are no other zeros in the half disc than these; the rest are not in it."""
         if not len(roots):
             return False
         self.roots = roots
@@ -228,8 +237,7 @@ class Spectrum:
             return False
         grows = (roots.sigma.real > np.maximum(roots.error, STILL)) & (np.abs(roots.sigma) < motion.reach)
         self.unstable = int(np.where(roots.sigma[grows].imag == 0.0, 1, 2).sum())
-        known = np.concatenate([roots.sigma, sigma[near & (sigma.real <= damped)]])
-        count = count_growing(motion, known)
+        count = count_growing(motion, np.concatenate([roots.sigma, rest]))
         inside = roots.sigma[(roots.sigma.real > 0.0) & (np.abs(roots.sigma) < motion.reach)]
         return count == int(np.where(inside.imag == 0.0, 1, 2).sum())
 

@@ -27,6 +27,8 @@ INSIDE = 0.6
 FIRST_STEP, ROUGH, FINE = 1e-4, 1e-5, 32.0 * EPS
 # A determinant of solutions of unit length is known to rounding, times this a step.
 NOISE = 4.0
+# On the real axis: points between a share of the reach and all of it, and how often a change of sign is halved.
+LEAST, ALONG, HALVINGS = 1e-5, 48, 6
 
 
 @dataclass(frozen=True)
@@ -245,6 +247,34 @@ def zeros_near(motion: Motion, found: Modes, wanted: NDArray[np.bool_]) -> Roots
     again = [np.array([k]) for k in alone[~good]] + [group for group in groups if len(group) > 1]
     parts += [_around(motion, guesses[group]) for group in again]
     return _distinct(np.concatenate([p.sigma for p in parts]), np.concatenate([p.error for p in parts]))
+
+
+def growing_real(motion: Motion, known: Roots) -> Roots:
+    """Roots with those on the real axis up to the reach where D changes its sign.
+
+    Parameters
+    ----------
+    motion : Motion
+    known : Roots
+
+    Returns
+    -------
+    Roots
+        The leading one first.
+    """
+    ends = motion.reach * np.geomspace(LEAST, 1.0, ALONG)
+    values, _ = motion.evans(ends + 0j)
+    at = np.flatnonzero(np.signbit(values.real[1:]) != np.signbit(values.real[:-1]))
+    low, high, falls = ends[at], ends[at + 1], np.signbit(values.real[at + 1])
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        beyond = np.signbit(motion.evans(middle + 0j)[0].real) == falls
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+    guesses = 0.5 * (low + high) + 0j
+    roots, found = polish(motion, guesses, np.concatenate([guesses, known.sigma]))
+    return _distinct(
+        np.concatenate([known.sigma, roots.sigma[found]]), np.concatenate([known.error, roots.error[found]])
+    )
 
 
 def _around(motion: Motion, guesses: Complex, rough: bool = False) -> Roots:
