@@ -15,7 +15,7 @@ CELLS, DEGREE = 112, 8
 CELL_NODES = 12
 # Points summed together, and points whose terms are gathered together: both stay in the cache. No powers of two: their
 # rows would fall on the same lines of it.
-BLOCK, GATHERED = 3000, 500
+BLOCK, GATHERED = 6000, 250
 
 # Powers of the two coordinates of a cell, term by term, in the order of Horner's rule.
 _POWERS_Y = np.array([DEGREE - size for size in range(DEGREE + 1) for _ in range(size + 1)])
