@@ -19,6 +19,7 @@ NOT_AGAIN = 12
 FLOW_OUTRUNS_WAVES = 13
 NOT_COUNTED = 14
 BEYOND = 15
+UNFINISHED = 16
 
 SENTENCES = {
     OK: "computed",
@@ -39,10 +40,12 @@ SENTENCES = {
     "frequency may grow there, so that a count of those that do means nothing",
     NOT_COUNTED: "growth rates were found, but not that there are no others",
     BEYOND: "even without drag the pair appears beyond the highest speed looked at",
+    UNFINISHED: "not finished within the patience; go on with --patience SECONDS (in Python: with "
+    "towatlas.patience(SECONDS))",
 }
 
 # Names for CF flag_meanings: one word each, in the order of the codes.
 FLAG_MEANINGS = (
     "computed no_transition step_limit not_converged outside_atlas not_found_by_scan bad_input lost_in_rounding "
-    "near_fold no_pair never_ends no_cusp not_again flow_outruns_waves not_counted beyond"
+    "near_fold no_pair never_ends no_cusp not_again flow_outruns_waves not_counted beyond unfinished"
 )

@@ -1,6 +1,7 @@
 """Growth rates: closed forms and known values, folds, symmetries, two methods, and where methods fail."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from towatlas.solve.galerkin import matrices, modes
 from towatlas.solve.growth import reach_of
 from towatlas.solve.motion import motions
 from towatlas.solve.spectrum import polish, together
+from towatlas.solve.stability import spectrum_of
 from towatlas.solve.winding import count_growing
 
 AIR = {"C": 0.018}
@@ -375,6 +377,28 @@ class TestCommand:
         assert "not proved" in err
         code, out, _ = run(capsys, "stability", "--lam=37.8", "--wf=1352", "--gamma=5.94", "--C=0.018")
         assert "flutter" in out.splitlines()[2]
+
+    def test_what_patience_allows_for(self, capsys, monkeypatch):
+        """The shape that is expected first; what is left over is said once, and the exit code."""
+        done = []
+
+        def some(found, k, motion):
+            if len(done) == 2:
+                raise towatlas.TooMuchWork("over")
+            done.append(k)
+            return spectrum_of(found, k, motion)
+
+        monkeypatch.setattr(sys.modules["towatlas.solve.stability"], "spectrum_of", some)
+        ask = ("stability", "--lam", 37.8, "--wf", 1352, "--gamma", 5.94, "--json")
+        code, out, said = run(capsys, *ask)
+        rows = json.loads(out)
+        assert code == 1
+        assert done == [2, 1]
+        assert [row["status"] for row in rows] == ["unfinished", "computed", "computed", "unfinished", "unfinished"]
+        assert rows[2]["kind"] == "flutter"
+        assert said.count("not finished within the patience") == 1
+        code, out, said = run(capsys, *ask)
+        assert (code, out, "over" in said) == (1, "", True)
 
     def test_what_is_refused(self, capsys):
         assert run(capsys, "stability", "--lam=-3", "--wf=0.2", "--gamma=0.3")[0] == 2

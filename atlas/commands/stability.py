@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from towatlas.commands.common import (
     FAILED,
     OK,
@@ -54,11 +56,12 @@ def _run(options: argparse.Namespace) -> int:
         print_json(rows)
     else:
         _print_table(rows)
-    for k in range(len(found)):
-        if found.status[k] != status.OK:
-            say(f"{found.equilibria.branch[k]}: {found.sentence(k)}")
+    for code in np.unique(found.status[found.status != status.OK]):
+        some = found.equilibria.branch[found.status == code]
+        say(f"{', '.join(map(str, some))}: {status.SENTENCES[int(code)]}")
     say(f"looked at: {found.looked_at}")
-    return OK if (found.status == status.OK).any() else FAILED
+    unfinished = (found.status == status.UNFINISHED).any()
+    return OK if (found.status == status.OK).any() and not unfinished else FAILED
 
 
 def _look_up(options: argparse.Namespace) -> int:

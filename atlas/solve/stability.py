@@ -5,7 +5,7 @@ from math import inf
 import numpy as np
 
 from towatlas.checks import check_speed
-from towatlas.effort import check_patience, patience
+from towatlas.effort import TooMuchWork, check_patience, patience
 from towatlas.kernels import status
 from towatlas.results import Equilibria
 from towatlas.results_motion import Stability
@@ -50,7 +50,8 @@ def stability(
     ValueError
         For numbers out of range, and what is not one number.
     ArithmeticError
-        If the shapes cannot be computed, or the work takes longer than `towatlas.patience` allows (TooMuchWork).
+        If the shapes cannot be computed, or `towatlas.patience` allows for the growth rates of none (TooMuchWork); of
+        the others those left over have the status UNFINISHED.
 
     Notes
     -----
@@ -90,7 +91,7 @@ def stability_of(found: Equilibria) -> Stability:
     Raises
     ------
     TooMuchWork
-        If the work takes longer than `towatlas.patience` allows.
+        If `towatlas.patience` allows for none of them; else those left over have the status UNFINISHED.
 
     Examples
     --------
@@ -103,12 +104,18 @@ def stability_of(found: Equilibria) -> Stability:
     unstable, index = np.full(count, -1), np.full(count, -1)
     codes = np.full(count, status.OK, np.int8)
     kinds, sigmas = ["unknown"] * count, [np.empty(0, np.complex128)] * count
+    late: TooMuchWork | None = None
     with patience():
         reach = reach_of(system, found.gamma)
         moved = motions(found.r_f, np.full(count, found.gamma), np.tile(system.row(), (count, 1)), reach)
-        for k in range(count):
-            check_patience("growth rates of the shapes", REMEDY, done=k, of=count)
-            answer = spectrum_of(found, k, moved[k])
+        # The one that is expected to be seen first, in case the patience ends.
+        for done, k in enumerate(sorted(range(count), key=lambda k: abs(k - found.expected))):
+            try:
+                check_patience("growth rates of the shapes", REMEDY, done=done, of=count)
+                answer = spectrum_of(found, k, moved[k])
+            except TooMuchWork as reason:
+                codes[k], late = status.UNFINISHED, late or reason
+                continue
             codes[k], index[k] = answer.status, answer.index
             roots = answer.roots
             kinds[k] = answer.kind
@@ -118,6 +125,8 @@ def stability_of(found: Equilibria) -> Stability:
                 sigmas[k] = roots.sigma * speed
                 growth[k], frequency[k] = sigmas[k][0].real, sigmas[k][0].imag
                 error[k] = max(roots.error[0], found.error[k]) * speed
+    if late is not None and (codes == status.UNFINISHED).all():
+        raise late
     return Stability(
         found,
         growth,
