@@ -14,7 +14,7 @@ from towatlas.kernels.system import COLUMNS
 from towatlas.maps.lookup import Cell, Map, OutsideMap
 from towatlas.maps.systems import RATIOS, Spec, system_of
 from towatlas.results import Folds
-from towatlas.solve.folds import name_folds, origin_of, solve_folds_between
+from towatlas.solve.folds import folds_in_speed, name_folds, origin_of, solve_folds_between
 from towatlas.solve.paths import Path
 from towatlas.solve.search import search
 from towatlas.system import System
@@ -61,6 +61,8 @@ def folds_around(data: xr.Dataset, cells: dict[str, Cell], system: System, low: 
     around = {str(name): array.values.reshape(-1, *array.shape[len(cells) :]) for name, array in box.items()}
     if (around["folds_status"] != status.OK).any():
         raise NotInMap("the folds of a point around were not made out")
+    if system.in_vacuum:
+        return folds_in_speed(system, low, high)
     top = np.log(high / low)
     # Where there are none, in the middle, so that something is looked at.
     t = np.log(around["fold_gamma"][np.isfinite(around["fold_gamma"])] / low) if around["folds"].any() else 0.5 * top
@@ -156,6 +158,8 @@ def find_folds(known: Map, system: System, slow: float, fast: float) -> Folds:
     data = known.dataset
     if "check_error" not in data:
         raise ValueError("this map holds no folds, or none that were checked: field folds, and [folds] checks")
+    if abs(slow) > abs(fast):
+        raise ValueError(f"the slower speed goes first, not {slow:g}, {fast:g}")
     low, high = sorted((float(end) for end in data.attrs["folds_gamma"]), key=abs)
     if not (slow * low > 0.0 and abs(low) <= abs(slow) and abs(fast) <= abs(high)):
         raise OutsideMap(f"speeds {slow:g} to {fast:g} are not all in the map, which has {low:g} to {high:g}")

@@ -23,8 +23,8 @@ from towatlas.system import System
 SPACING = 0.01
 # Halvings of a step across an edge by counts, then rounds of secants on what is zero there.
 HALVINGS, ROUNDS = 12, 40
-# Of log gamma, at which an edge is found.
-SETTLED = 1e-13
+# Of log gamma, at which an edge is found, and growth that is none there, in units of Omega.
+SETTLED, NO_GROWTH = 1e-13, 1e-9
 # Circle around two modes that meet without drag, and how far a mode may move from one sample to the next, in units of
 # Omega.
 CIRCLE, FAR = 0.05, 0.2
@@ -237,7 +237,22 @@ class Follower:
         return Edge("hopf" if self.drag else "krein", t, frequency)
 
     def hopf(self, still: Sample, growing: Sample, sigma: complex) -> tuple[float, float]:
-        """Where the growth of a mode is zero, by secants that keep their bracket."""
+        """Where the growth of a mode is zero."""
+        for _ in range(HALVINGS):
+            t, here = self._zero_growth(still, growing, sigma)
+            if abs(here.real) < NO_GROWTH:
+                return t, here.imag
+            # Another mode has come in between: nearer samples tell them apart.
+            middle = self.between(still, growing, 0.5 * (still.t + growing.t))
+            near = [complex(s) for s in middle.spectrum.growing if abs(s - sigma) < FAR]
+            if near:
+                growing, sigma = middle, min(near, key=lambda s: abs(s - sigma))
+            else:
+                still = middle
+        raise _LostError
+
+    def _zero_growth(self, still: Sample, growing: Sample, sigma: complex) -> tuple[float, complex]:
+        """The same by secants that keep their bracket, and the growth rate where they end."""
         damped = still.spectrum.roots.sigma[still.spectrum.roots.sigma.real <= 0.0]
         ends = [(still.t, _nearest(damped, sigma)), (growing.t, sigma)]
         heights = [ends[0][1].real, sigma.real]
@@ -253,7 +268,7 @@ class Follower:
             ends[side], heights[side] = (t, here), here.real
             if abs(t - last) < SETTLED or abs(here.real) < EPS:
                 break
-        return t, here.imag
+        return t, here
 
     def mode(self, a: Sample, b: Sample, t: float, guess: complex) -> complex:
         """The growth rate next to a guess, of the shape between two samples."""

@@ -15,9 +15,9 @@ FAINT = 1e-6
 SLOWEST, FASTEST, DENSEST = 1e-5, 1e3, 30.0
 # Errors of shots may be so much larger than rounding: only how many nodes there are in the vacuum is asked for.
 LOOSENESS = 1e4
-# Of logarithms, for differences.
-BESIDE = 1e-6
-STEPS = Steps(first=2.0, longest=4.0, shortest=1e-4, near=1e-3, bent=0.1, straight=0.8, points=500)
+# Of logarithms, for differences: with larger ones folds of many nodes come to other folds of the vacuum.
+BESIDE = 1e-7
+STEPS = Steps(first=0.5, longest=1.0, shortest=1e-4, near=1e-4, bent=0.1, straight=0.9, points=1000)
 
 
 def numbers_of(x: Array, rows: Array, gamma: Array, heavy: bool) -> Integers:

@@ -30,7 +30,7 @@ ASTRAY, ASTRAY_IN_X = 0.1, 0.01
 # Extrema of log rho so near to zero are watched; which part of the way to the next column one may be from reaching it.
 WATCHED, REACHES = 0.5, 0.6
 # For differences in x, on both sides, and in t.
-BESIDE_X, BESIDE_T = 1e-5, 1e-6
+BESIDE_X, BESIDE_T = 1e-5, 1e-7
 # Newton's method for a fold.
 FOLD_ROUNDS, LONGEST, SETTLED = 24, 1.0, 1e-11
 ROUNDINGS = 64.0
@@ -257,8 +257,9 @@ def _goes_on(a: Column, b: Column, drop_a: int = -1, drop_b: int = -1) -> bool:
     return bool((apart <= np.fmin(ASTRAY * gaps, ASTRAY_IN_X)).all())
 
 
-def _about_to(column: Column, step: float) -> bool:
-    """Whether within a step an extremum of a column may reach the tow radius, or a shape be where two more begin.
+def _about_to(column: Column, step: float, fold: Fold | None = None, has_pair: bool = False) -> bool:
+    """Whether within a step an extremum of a column may reach the tow radius, or a shape be where two more begin, but
+    for a fold that is known, of a pair that the column has or has not.
 
     Where the slope at a shape falls towards zero and rises again there is a cusp near by, with two folds on one side
     of it, as close together as one likes.
@@ -267,10 +268,16 @@ def _about_to(column: Column, step: float) -> bool:
     reaches &= np.abs(column.heights) < REACHES * np.abs(column.rises * step)
     folds = column.slopes * column.bends * step < 0.0
     folds &= np.abs(column.slopes) < np.abs(column.bends * step)
+    if fold is not None and has_pair:
+        inner, outer = column.x[fold.pair : fold.pair + 2]
+        reaches &= (column.peaks < inner) | (column.peaks > outer)
+        folds[fold.pair : fold.pair + 2] = False
+    elif fold is not None and reaches.any():
+        reaches[np.argmin(np.where(reaches, np.abs(column.peaks - fold.x), inf))] = False
     return bool(reaches.any() or folds.any())
 
 
-def solve_folds(path: Path, x: Array, t: Array) -> tuple[Array, Array, Array, Booleans]:
+def solve_folds(path: Path, x: Array, t: Array) -> tuple[Array, Array, Array, Booleans, Booleans]:
     """Folds near guesses.
 
     Parameters
@@ -283,13 +290,15 @@ def solve_folds(path: Path, x: Array, t: Array) -> tuple[Array, Array, Array, Bo
     -------
     x, t, error : ndarray, shape (folds,)
         The error is that of t.
+    begins : ndarray of bool, shape (folds,)
+        Whether two shapes begin there as t rises, or else meet.
     solved : ndarray of bool, shape (folds,)
     """
-    rate = np.full(len(x), np.nan)
+    rate, bend = np.full(len(x), np.nan), np.full(len(x), np.nan)
 
     def residuals(z: Array, i: Integers) -> tuple[Array, Array, Booleans]:
         along, across, sound = path.log_rho(z[:, 0], z[:, 1])
-        rate[i] = across[:, 0]
+        rate[i], bend[i] = across[:, 0], along[:, 2]
         matrix = np.stack([along[:, 1], across[:, 0], along[:, 2], across[:, 1]], axis=1).reshape(-1, 2, 2)
         return along[:, :2], matrix, sound
 
@@ -300,7 +309,7 @@ def solve_folds(path: Path, x: Array, t: Array) -> tuple[Array, Array, Array, Bo
     z, step, solved = newton(residuals, np.stack([x, t], axis=1), rounds=FOLD_ROUNDS, longest=LONGEST, settled=settled)
     with np.errstate(divide="ignore", invalid="ignore"):
         error = np.abs(step[:, 1]) + ROUNDINGS * EPS / np.abs(rate)
-    return z[:, 0], z[:, 1], error, solved
+    return z[:, 0], z[:, 1], error, rate * bend < 0.0, solved
 
 
 def _meetings(path: Path, between: list[tuple[Column, Column]]) -> list[Fold | None]:
@@ -316,9 +325,10 @@ def _meetings(path: Path, between: list[tuple[Column, Column]]) -> list[Fold | N
     more = [a if len(a.x) > len(b.x) else b for a, b in between]
     inner, outer = (np.array([more[i].x[pair + k] for i, pair in zip(owner, pairs, strict=True)]) for k in (0, 1))
     guess = 0.5 * (inner + outer)
-    x, t, error, solved = solve_folds(path, guess, np.array([more[i].t for i in owner]))
+    x, t, error, begins, solved = solve_folds(path, guess, np.array([more[i].t for i in owner]))
     low, high = (np.array([columns[k].t for columns in between])[owner] for k in (0, 1))
-    good = solved & (t >= low) & (t <= high) & (np.abs(x - guess) < outer - inner)
+    rising = np.array([len(b.x) > len(a.x) for a, b in between])[owner]
+    good = solved & (t >= low) & (t <= high) & (np.abs(x - guess) < outer - inner) & (begins == rising)
     folds: list[Fold | None] = []
     for i in range(len(between)):
         found = np.flatnonzero(good & (owner == i))
@@ -362,10 +372,10 @@ def trace(path: Path, low: float, high: float, at: Array | None = None) -> Trace
         for k, (a, b) in enumerate(pairwise(columns)):
             if not open_[k]:
                 continue
-            step = b.t - a.t
-            plain = folds[k] is not None
-            if len(a.x) == len(b.x):
-                plain = _goes_on(a, b) and not _about_to(a, step) and not _about_to(b, -step)
+            step, fold = b.t - a.t, folds[k]
+            plain = fold is not None or (len(a.x) == len(b.x) and _goes_on(a, b))
+            plain = plain and not _about_to(a, step, fold, len(a.x) > len(b.x))
+            plain = plain and not _about_to(b, -step, fold, len(b.x) > len(a.x))
             if plain:
                 open_[k] = False
             elif step > NEAREST:
