@@ -35,6 +35,14 @@ def test_hopf_points_that_are_known(span, edge, low):
     assert kinds[nearest] == "hopf"
 
 
+@pytest.mark.parametrize("span", [(5.85, 6.05), (5.88, 6.0856), (5.9, 6.1)])
+def test_an_edge_beside_another_mode_is_a_zero_of_growth(span):
+    """Between the same two samples another mode begins to grow: secants that change over end where nothing is zero."""
+    windows = towatlas.flutter(29.248754206543225, 1352.3444976076555, span, C=0.017969254569695718).windows
+    first, second = (w for w in windows if w.branch == "shape 1")
+    assert (first.high, second.low) == pytest.approx((5.99320435199, 5.92451311806), rel=1e-11)
+
+
 def test_an_edge_takes_few_shots(monkeypatch):
     """Secants that keep a bracket, not halvings of it, of which 1e-13 would take forty."""
     taken, mode = [], Follower.mode

@@ -89,6 +89,25 @@ def counts(system, gamma, **fluid):
             (1, 3),
             "vacuum",
         ),
+        # A pair begins where Newton's method is sent for the end of another, within a step of both.
+        (
+            24.765381583946095,
+            2.3672203273375922,
+            (0.1, 5),
+            {"C": 1.568600909617942, "w": 0.3391103755223098, "m_f": 3.3765531037593486},
+            (1.974126, 2.463959, 2.474816, 2.563326),
+            (1, 3, 5, 3),
+            "drag",
+        ),
+        (
+            29.952190988144118,
+            0.2080115094447762,
+            (0.1, 5),
+            {"C": 1.8695171615091335, "w": 0.28392441607924307, "m_f": 0.40042211234466646},
+            (1.528291, 2.204919, 2.225607, 2.336964),
+            (1, 3, 5, 3),
+            "drag",
+        ),
         # A fold beyond the speeds that are easily looked at.
         (8.598213412228047, 632.2661936372043, (40, 60), {"C": 0.043740859791831455}, (54.426808,), (7,), "vacuum"),
     ],
@@ -104,6 +123,41 @@ def test_known_folds(lam, w_f, span, fluid, gamma, below, origin):
     np.testing.assert_array_equal(
         counts(found.system, found.gamma), np.stack([found.shapes_below, found.shapes_above], axis=1)
     )
+
+
+@pytest.mark.parametrize(
+    ("lam", "w_f", "span", "fluid", "n"),
+    [
+        (25.69752444087756, 0.0015959863737249626, (0.1, 6), {"C": 0.002463972304585103, "w": 0.1}, range(2, 13)),
+        (31.022, 18.053, (0.1, 6), {"C": 0.067757, "w": 0.18758}, (5, 5, 6, 6, 7, 8, 9, 10)),
+        (24.53174, 1.452963, (0.1, 6), {"C": 0.003905345, "w": 0.650294}, (1, *range(1, 10))),
+        (27.5166, 67.703, (0.1, 6), {"C": 0.083538, "w": 0.42046}, (6, 6)),
+        (3.54898, 0.0651625, (-6, -0.1), {"C": 0.488255, "w": 0.1, "C_t": 0.0185819, "C_s": -0.42497}, (1, 1)),
+        (11.65031944620065, 2.8002641122701175, (-6, -0.1), {"C": 155.217717, "C_f": 0.0273513, "w": 0.1}, (0, 0)),
+        (16.612144111707586, 35.24278168405032, (5, 6), {"C": 1.7965123515564951}, (0,) * 6),
+    ],
+)
+def test_names_where_long_steps_come_to_other_curves(lam, w_f, span, fluid, n):
+    """As steps ten times shorter name them. Folds of one number begin and end shapes in turn."""
+    found = towatlas.folds(lam, w_f, span, **fluid)
+    assert found.n.tolist() == list(n)
+    change = found.shapes_above - found.shapes_below
+    for number in set(n) - {0}:
+        assert (np.diff(change[found.n == number]) != 0).all()
+
+
+def test_every_fold_is_of_the_kind_that_the_shapes_beside_it_say():
+    rng = np.random.default_rng(8)
+    some = 0
+    for _ in range(20):
+        lam, w_f, w, C = rng.uniform(5, 32), 10 ** rng.uniform(-1, 2), rng.uniform(0.1, 1), 10 ** rng.uniform(-1.5, 1)
+        found = towatlas.folds(lam, w_f, (0.1, 5.0), C=C, w=w, m_f=w_f * rng.uniform(1, 2))
+        assert (found.shapes_below[1:] == found.shapes_above[:-1]).all()
+        np.testing.assert_array_equal(
+            counts(found.system, found.gamma), np.stack([found.shapes_below, found.shapes_above], axis=1)
+        )
+        some += len(found)
+    assert some > 6
 
 
 def test_in_a_vacuum_and_near_it():
@@ -321,3 +375,7 @@ def test_systems_at_once():
     assert square.r_f.dims == ("system_0", "system_1", "shape")
     with pytest.raises(ValueError, match="do not broadcast"):
         towatlas.equilibria_many([1.0, 2.0], [1.0, 2.0, 3.0], 1.0)
+
+
+def test_none_at_once():
+    assert towatlas.equilibria_many(2.0, 1.0, np.empty(0)).sizes["system"] == 0

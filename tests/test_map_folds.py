@@ -109,6 +109,20 @@ def test_names_are_those_on_which_all_around_agree(known):
     assert unsure.folds(point, *SPAN).n.tolist() == here.n.tolist()
 
 
+def test_the_vacuum_in_a_map(tmp_path):
+    """Its folds are counted, and have their names, where no point around has as many."""
+    axes = {"C": [0, 1e-3], "lam": [4, 14]}
+    spec = {
+        "fields": ["folds", "origin"],
+        "system": {"w_f": 1},
+        "axes": axes,
+        "folds": {"from": 0.1, "to": 5, "checks": 2},
+    }
+    build_map(make_spec(spec), tmp_path / "map")
+    found = towatlas.open_map(tmp_path / "map").folds(System.of(7.0, 1.0), 0.1, 5.0)
+    assert (found.n.tolist(), set(found.origin)) == ([1, 2, 3], {"vacuum"})
+
+
 def test_never_where_folds_are_others(known):
     here = system(12.0, 1.9)
     data = known.dataset
@@ -157,6 +171,11 @@ def test_the_same_bytes_when_it_goes_on(folder, tmp_path):
     files = [path.relative_to(folder) for path in folder.rglob("*") if path.is_file()]
     assert len(files) > 20
     assert all((again / file).read_bytes() == (folder / file).read_bytes() for file in files)
+
+
+def test_the_slower_speed_goes_first(known):
+    with pytest.raises(ValueError, match="the slower speed goes first, not 5"):
+        known.folds(system(12.0, 1.9), *SPAN[::-1])
 
 
 def test_maps_that_hold_no_folds(known):

@@ -107,7 +107,7 @@ def equilibria_many(
     variables: dict[str, Any] = {}
     for name, long_name in FIELDS.items():
         about = {"long_name": long_name, "units": "degree" if name == "phase_deg" else "1"}
-        variables[name] = ((*dims, "shape"), columns[name].reshape(*shape, -1), about)
+        variables[name] = ((*dims, "shape"), columns[name].reshape(*shape, columns[name].shape[-1]), about)
     for name, column in (*zip(COLUMNS, systems.T, strict=True), ("gamma", speeds), ("count", count), ("status", codes)):
         variables[name] = (dims, column.reshape(shape), {"units": "1"})
     meanings = status.FLAG_MEANINGS
