@@ -83,12 +83,15 @@ def _kept() -> Path:
 @functools.cache
 def _factors() -> dict[str, float]:
     """Factors to SI that pint has told before, by unit and SI unit: who knows them needs no pint."""
-    content = read_sealed(_kept())
+    try:
+        content = read_sealed(_kept())
+    except RuntimeError:  # there is no home
+        content = None
     return {} if content is None else json.loads(content)
 
 
 def _keep(known: dict[str, float]) -> None:
-    with suppress(OSError):
+    with suppress(OSError, RuntimeError):
         _kept().parent.mkdir(parents=True, exist_ok=True)
         write_sealed(_kept(), json.dumps(known).encode())
 

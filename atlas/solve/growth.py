@@ -224,6 +224,8 @@ class Spectrum:
         rest = sigma[near & (sigma.real <= damped)]
         if self._all_inside(motion, roots, rest):
             return True
+        if motion.fastest_flow > 1.0:
+            return False
         # Where drag is strong Galerkin's method is no guess of what grows slowly beside a fold.
         more = growing_real(motion, roots)
         return len(more) > len(roots) and self._all_inside(motion, more, rest)
