@@ -3,6 +3,7 @@
 import io
 import json
 from dataclasses import asdict
+from pathlib import Path
 from shutil import copytree
 from types import SimpleNamespace
 
@@ -11,6 +12,7 @@ import pytest
 from helpers import run
 
 import towatlas
+from benchmarks.maps_folds import systems
 from towatlas.kernels import status
 from towatlas.maps.build import build_map
 from towatlas.maps.folds import NotInMap
@@ -39,6 +41,7 @@ speed = "3.1 m/s"
 [fluid]
 density = 1025
 """
+WET_FOLDS = Path(__file__).parents[1] / "docs" / "data" / "wet-folds.nc"
 SPAN = (0.03, 5.0)
 GROUPS = scene_of_text(SCENE.format(2.0).encode(), "-").system("water")
 SPEC = {
@@ -230,3 +233,18 @@ def test_scene(capsys, monkeypatch, folder):
     outside, said = ask(2.6, "--atlas", folder)
     assert "not looked up: lam = 2.6 is outside the map" in said
     assert outside["jumps_complete"]
+
+
+def test_the_atlas_of_wet_folds():
+    """In the repository: systems at random are told as solved directly, and its checks say how well it tells them."""
+    known = towatlas.open_map(WET_FOLDS)
+    errors = known.dataset.check_error.values
+    assert (errors.size, np.isnan(errors).sum(), np.isinf(errors).sum()) == (1000, 1, 0)
+    low, high = known.dataset.attrs["folds_gamma"]
+    some = 0
+    for point in systems(known, 12, seed=3):
+        found, direct = known.folds(point, low, high), folds_in_speed(point, low, high)
+        assert (found.n.tolist(), found.shapes_above.tolist()) == (direct.n.tolist(), direct.shapes_above.tolist())
+        np.testing.assert_allclose(found.gamma, direct.gamma, rtol=1e-12)
+        some += len(found)
+    assert some > 0

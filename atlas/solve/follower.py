@@ -28,6 +28,8 @@ SETTLED, NO_GROWTH = 1e-13, 1e-9
 # Circle around two modes that meet without drag, and how far a mode may move from one sample to the next, in units of
 # Omega.
 CIRCLE, FAR = 0.05, 0.2
+# Shapes of a branch that are made ready together.
+AT_ONCE = 8
 # So near to what is weak growth is looked at between samples.
 ALMOST = 0.9
 REMEDY = "a narrower range, a lower speed or a shorter cable has fewer shapes to look at"
@@ -142,13 +144,18 @@ class Follower:
         points = self._points(traced, places)
         order = sorted(range(len(points)), key=lambda j: abs(points[j][0] - t))
         samples: dict[int, Sample] = {}
-        for j in order:
+        bodies: dict[int, tuple[int, Motion]] = {}
+        for place, j in enumerate(order):
             way = [samples[m] for m in samples if (m - order[0]) * (j - order[0]) >= 0]
             if way and enough(way):
                 continue
             try:
                 check_patience("growth rates along the branch", REMEDY, done=len(samples), of=len(points))
-                samples[j] = self.sample(*points[j])
+                if j not in bodies:
+                    # Some at once: few shots leave lanes idle.
+                    some = order[place : place + AT_ONCE]
+                    bodies |= zip(some, self._bodies([points[m] for m in some]), strict=True)
+                samples[j] = self._sample(*points[j], *bodies[j])
             except TooMuchWork:
                 if not samples:
                     raise
@@ -173,10 +180,21 @@ class Follower:
         return sorted(points)
 
     def sample(self, t: float, x: float, place: int) -> Sample:
-        ends = self.path.shots(np.array([x]), np.array([t]), SLOPE)
-        nodes = int(np.floor(ends.angle[0] / np.pi + 0.5))
+        return self._sample(t, x, place, *self._bodies([(t, x, place)])[0])
+
+    def _sample(self, t: float, x: float, place: int, nodes: int, motion: Motion) -> Sample:
         r_f = float(np.exp(x) / self.speed(t) ** 2)
-        return Sample(t, x, nodes, place, Spectrum(self.system_at(t), self.speed(t), r_f))
+        return Sample(t, x, nodes, place, Spectrum(self.system_at(t), self.speed(t), r_f, motion=motion))
+
+    def _bodies(self, points: list[tuple[float, float, int]]) -> list[tuple[int, Motion]]:
+        """Nodes and motions of shapes."""
+        t, x, _ = (np.array(column) for column in zip(*points, strict=True))
+        ends = self.path.shots(x, t, SLOPE)
+        nodes = np.floor(ends.angle / np.pi + 0.5).astype(int)
+        systems, speeds = [self.system_at(one) for one in t], np.array([self.speed(one) for one in t])
+        rows = np.stack([system.row() for system in systems])
+        reach = np.array([reach_of(system, speed) for system, speed in zip(systems, speeds, strict=True)])
+        return list(zip(nodes.tolist(), motions(np.exp(x) / speeds**2, speeds, rows, reach), strict=True))
 
     def between(self, a: Sample, b: Sample, t: float) -> Sample:
         """The shape of the branch of two samples at a speed between them."""
