@@ -263,14 +263,14 @@ def growing_real(motion: Motion, known: Roots) -> Roots:
         The leading one first.
     """
     ends = motion.reach * np.geomspace(LEAST, 1.0, ALONG)
-    values, _ = motion.evans(ends + 0j)
+    values, _ = motion.evans(ends.astype(complex))
     at = np.flatnonzero(np.signbit(values.real[1:]) != np.signbit(values.real[:-1]))
     low, high, falls = ends[at], ends[at + 1], np.signbit(values.real[at + 1])
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        beyond = np.signbit(motion.evans(middle + 0j)[0].real) == falls
+        beyond = np.signbit(motion.evans(middle.astype(complex))[0].real) == falls
         low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-    guesses = 0.5 * (low + high) + 0j
+    guesses = (0.5 * (low + high)).astype(complex)
     roots, found = polish(motion, guesses, np.concatenate([guesses, known.sigma]))
     return _distinct(
         np.concatenate([known.sigma, roots.sigma[found]]), np.concatenate([known.error, roots.error[found]])
