@@ -29,6 +29,8 @@ ROUNDS = 48
 ASTRAY, ASTRAY_IN_X = 0.1, 0.01
 # Extrema of log rho so near to zero are watched; which part of the way to the next column one may be from reaching it.
 WATCHED, REACHES = 0.5, 0.6
+# The same beside a fold, where others are more likely.
+BESIDE_FOLD = 2.0
 # For differences in x, on both sides, and in t.
 BESIDE_X, BESIDE_T = 1e-5, 1e-7
 # Newton's method for a fold.
@@ -265,15 +267,13 @@ def _about_to(column: Column, step: float, fold: Fold | None = None, has_pair: b
     of it, as close together as one likes.
     """
     reaches = column.heights * column.rises * step < 0.0
-    reaches &= np.abs(column.heights) < REACHES * np.abs(column.rises * step)
+    reaches &= np.abs(column.heights) < (REACHES if fold is None else BESIDE_FOLD) * np.abs(column.rises * step)
     folds = column.slopes * column.bends * step < 0.0
     folds &= np.abs(column.slopes) < np.abs(column.bends * step)
-    if fold is not None and has_pair:
-        inner, outer = column.x[fold.pair : fold.pair + 2]
-        reaches &= (column.peaks < inner) | (column.peaks > outer)
-        folds[fold.pair : fold.pair + 2] = False
-    elif fold is not None and reaches.any():
+    if fold is not None and reaches.any():
         reaches[np.argmin(np.where(reaches, np.abs(column.peaks - fold.x), inf))] = False
+    if fold is not None and has_pair:
+        folds[fold.pair : fold.pair + 2] = False
     return bool(reaches.any() or folds.any())
 
 
