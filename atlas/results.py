@@ -1,5 +1,6 @@
 """What the program answers with. Arrays of one answer have one shape; all numbers are dimensionless unless said."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -13,6 +14,8 @@ from towatlas.system import System
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+# What there is of each fold.
+FOLD_COLUMNS = ("value", "gamma", "r_f", "shapes_below", "shapes_above", "n", "origin", "error", "status")
 
 
 @dataclass(frozen=True, repr=False)
@@ -221,8 +224,24 @@ class Folds(Answer):
         -------
         Folds
         """
-        columns = ("value", "gamma", "r_f", "shapes_below", "shapes_above", "n", "origin", "error", "status")
-        return replace(self, **{name: getattr(self, name)[which] for name in columns})
+        return replace(self, **{name: getattr(self, name)[which] for name in FOLD_COLUMNS})
+
+
+def joined(parts: Sequence[Folds]) -> Folds:
+    """Folds of one system over ranges that follow each other.
+
+    Parameters
+    ----------
+    parts : sequence of Folds
+        At least one.
+
+    Returns
+    -------
+    Folds
+    """
+    columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in FOLD_COLUMNS}
+    searched = "; ".join(part.searched for part in parts)
+    return replace(parts[0], **columns, complete=all(part.complete for part in parts), searched=searched)
 
 
 @dataclass(frozen=True, repr=False)

@@ -150,7 +150,7 @@ def test_never_where_folds_are_others(known):
         (system(12.0, 2.0, w=0.5), SPAN, "w = 0.5 is outside the map, which has 0.623575"),
         (system(12.0, 2.0, C_t=0.1), SPAN, "C_t = 0.1 is outside the map, which has 0"),
         (system(12.0, 2.0), (0.03, 6.0), "speeds 0.03 to 6 are not all in the map, which has 0.03 to 5"),
-        (system(12.0, 2.0), (-0.03, -2.0), "speeds -0.03 to -2 are not all"),
+        (system(12.0, 2.0), (-0.03, -2.0), "speeds -0.03 to -2 are of a turn to the other side"),
     ],
 )
 def test_outside_is_named(known, there, speeds, match):
@@ -230,8 +230,17 @@ def test_scene(capsys, monkeypatch, folder):
     assert [(row["n"], row["origin"]) for row in with_map["jumps"]] == [(1, "vacuum")]
     assert [row["gamma"] for row in with_map["jumps"]] == pytest.approx(direct.gamma, rel=2.0 * direct.error[0])
     assert ask(2.0, "--atlas", folder.with_suffix(".nc"))[0] == with_map
+    # Speeds that the map has not are looked at by the solver, and the rest looked up.
+    for speed in (0.6, 2.4):
+        partly, _ = ask(2.0, "--atlas", folder, "--gamma", speed)
+        without, _ = ask(2.0, "--gamma", speed)
+        assert "by a map" in partly["jumps_searched"]
+        assert f"gamma {speed / 30 if speed < 1 else 5:g} to" in partly["jumps_searched"]
+        columns = [[(row["gamma"], row["n"]) for row in one["jumps"]] for one in (partly, without)]
+        assert len(columns[0]) == len(columns[1]) > 0
+        np.testing.assert_allclose(*columns, rtol=1e-12)
     outside, said = ask(2.6, "--atlas", folder)
-    assert "not looked up: lam = 2.6 is outside the map" in said
+    assert "jumps are not looked up, but solved for: lam = 2.6 is outside the map" in said
     assert outside["jumps_complete"]
 
 

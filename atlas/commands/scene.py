@@ -16,7 +16,7 @@ from towatlas.commands.quantities import Range, quantity, range_of
 from towatlas.commands.scene_files import check_out, write_scene
 from towatlas.commands.scene_seen import as_object, lines_of
 from towatlas.kernels import status
-from towatlas.results import Folds
+from towatlas.results import Folds, joined
 from towatlas.scene.choice import Choice, percent
 from towatlas.scene.diagrams import SceneDiagram, scene_diagram
 from towatlas.scene.file import read_scene, scene_of_text, shipped_scenes
@@ -141,11 +141,17 @@ def _finder(path: Path | None) -> Finder:
     known = open_map(path)
 
     def find(system: System, slow: float, fast: float) -> Folds:
+        """Within the speeds of the map by it, beyond them by the solver."""
         try:
-            return known.folds(system, slow, fast)
+            inside = known.folds(system, *known.speeds_within(slow, fast))
         except (OutsideMap, NotInMap) as error:
+            say(f"jumps are not looked up, but solved for: {error}")
             found = solve_jumps(system, slow, fast)
             return replace(found, searched=f"{found.searched}; not looked up: {error}")
+        first, last = known.speeds_within(slow, fast)
+        before = [solve_jumps(system, slow, first)] if abs(slow) < abs(first) else []
+        after = [solve_jumps(system, last, fast)] if abs(last) < abs(fast) else []
+        return joined([*before, inside, *after])
 
     return find
 

@@ -161,7 +161,9 @@ def find_folds(known: Map, system: System, slow: float, fast: float) -> Folds:
     if abs(slow) > abs(fast):
         raise ValueError(f"the slower speed goes first, not {slow:g}, {fast:g}")
     low, high = sorted((float(end) for end in data.attrs["folds_gamma"]), key=abs)
-    if not (slow * low > 0.0 and abs(low) <= abs(slow) and abs(fast) <= abs(high)):
+    if not slow * low > 0.0:
+        raise OutsideMap(f"speeds {slow:g} to {fast:g} are of a turn to the other side than those of the map")
+    if not (abs(low) <= abs(slow) and abs(fast) <= abs(high)):
         raise OutsideMap(f"speeds {slow:g} to {fast:g} are not all in the map, which has {low:g} to {high:g}")
     cells = _cells(data, system)
     errors = data["check_error"].values
@@ -169,10 +171,10 @@ def find_folds(known: Map, system: System, slow: float, fast: float) -> Folds:
     if not np.isfinite(answered).any():
         raise NotInMap("no check of the map was told its folds: how well it tells folds is not known")
     found = folds_around(data, cells, system, low, high)
-    wrong = int(np.isinf(answered).sum())
+    wrong, some = int(np.isinf(answered).sum()), int((data["check_folds"].values[~np.isnan(errors)] > 0).sum())
     searched = (
         f"gamma {low:g} to {high:g} by a map: shapes counted at both, and followed over the speeds of the folds of all "
-        f"points around it; of {len(answered)} systems at random of which the map tells folds, {wrong} have others"
+        f"points around it; of {len(answered)} random systems, {some} with folds, {wrong} have others than told"
     )
     speeds = np.abs(found.gamma)
     return replace(found, searched=searched).part((abs(slow) <= speeds) & (speeds <= abs(fast)))
@@ -184,7 +186,8 @@ def _cells(data: xr.Dataset, system: System) -> dict[str, Cell]:
     with np.errstate(divide="ignore", invalid="ignore"):
         numbers |= {ratio: float(np.divide(numbers[a], numbers[b])) for ratio, (a, b) in RATIOS.items()}
     cells = {}
-    for name in map(str, data["folds"].dims):
+    # A ratio of nothing to nothing is outside because of another number.
+    for name in sorted(map(str, data["folds"].dims), key=lambda name: name in RATIOS):
         values, at = data[name].values, numbers[name]
         for end in (values[0], values[-1]):
             at = float(end) if np.isclose(at, end, rtol=ROUNDED, atol=0.0) else at

@@ -1,5 +1,6 @@
 """Looking a map up: never across a fold or an edge of stability, with an error beside each number."""
 
+import math
 import os
 from dataclasses import dataclass
 from itertools import product
@@ -132,6 +133,24 @@ class Map:
 
         with patience():
             return find_folds(self, system, slow, fast)
+
+    def speeds_within(self, slow: float, fast: float) -> tuple[float, float]:
+        """The part of a range of speeds for which the map has folds; the range itself where it has no part of it.
+
+        Parameters
+        ----------
+        slow, fast : float
+            [-], of one sign, the slower first.
+
+        Returns
+        -------
+        slow, fast : float
+        """
+        if "folds_gamma" not in self.dataset.attrs:
+            return slow, fast
+        low, high = sorted(abs(float(end)) for end in self.dataset.attrs["folds_gamma"])
+        first, last = max(abs(slow), low), min(abs(fast), high)
+        return (math.copysign(first, slow), math.copysign(last, fast)) if first < last else (slow, fast)
 
     def _check_inside(self, points: Array, axes: dict[str, Array]) -> None:
         for k, (name, values) in enumerate(axes.items()):
