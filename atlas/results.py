@@ -15,7 +15,7 @@ from towatlas.system import System
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 # What there is of each fold.
-FOLD_COLUMNS = ("value", "gamma", "r_f", "shapes_below", "shapes_above", "n", "origin", "error", "status")
+OF_EACH_FOLD = ("value", "gamma", "r_f", "shapes_below", "shapes_above", "n", "origin", "error", "status")
 
 
 @dataclass(frozen=True, repr=False)
@@ -224,7 +224,7 @@ class Folds(Answer):
         -------
         Folds
         """
-        return replace(self, **{name: getattr(self, name)[which] for name in FOLD_COLUMNS})
+        return replace(self, **{name: getattr(self, name)[which] for name in OF_EACH_FOLD})
 
 
 def joined(parts: Sequence[Folds]) -> Folds:
@@ -239,7 +239,7 @@ def joined(parts: Sequence[Folds]) -> Folds:
     -------
     Folds
     """
-    columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in FOLD_COLUMNS}
+    columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in OF_EACH_FOLD}
     searched = "; ".join(part.searched for part in parts)
     return replace(parts[0], **columns, complete=all(part.complete for part in parts), searched=searched)
 
