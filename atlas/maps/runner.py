@@ -5,6 +5,7 @@ program had not finished is missing from the folder, and is done again.
 """
 
 import logging
+import os
 import shutil
 import time
 from collections.abc import Iterator, Sequence
@@ -31,10 +32,8 @@ TRIES = 4
 GONE, BACK, LOOK = 120.0, 60.0, 2.0
 # What a worker of dask does by itself, and tiles do not need, takes over a quarter of the time: memory is given back at
 # each small array and asked for again, and what runs is looked at a hundred times a second.
-LEAN = {
-    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": None,
-    "distributed.worker.profile.enabled": False,
-}
+TRIM = "MALLOC_TRIM_THRESHOLD_"
+LEAN = {f"distributed.nanny.pre-spawn-environ.{TRIM}": None, "distributed.worker.profile.enabled": False}
 # What compiling may take, s.
 COMPILED = 900.0
 # Room that is left on a disk, bytes: for the file systems' own needs, and the next tile of each worker.
@@ -182,6 +181,9 @@ def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
         try:
             if scheduler is None:
                 stack.enter_context(config.set(LEAN))
+                # A cluster that this process had before leaves its setting here, and what is here goes first.
+                if (trim := os.environ.pop(TRIM, None)) is not None:
+                    stack.callback(os.environ.__setitem__, TRIM, trim)
                 address = stack.enter_context(
                     LocalCluster(
                         n_workers=workers,
