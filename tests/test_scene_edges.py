@@ -16,6 +16,8 @@ from towatlas.scene.file import read_scene
 from towatlas.scene.jumps import answer_scene
 from towatlas.scene.ranges import design_over
 from towatlas.scene.verdicts import verdicts_of
+from towatlas.solve.follower import followed
+from towatlas.system import System
 
 FIG3 = read_scene("skop-fig3")
 
@@ -45,6 +47,34 @@ def test_edges_are_those_of_the_windows_of_flutter(gamma, enters):
             kind = verdicts_of(answer).shapes[answer.equilibria.expected].kind
             # Next to an edge growth is weak on the one side, and may be, by another mode, on the other.
             assert kind in (("flutter", "weak") if beyond == enter else ("stable", "weak"))
+
+
+@pytest.mark.parametrize(
+    ("numbers", "gamma", "end"),
+    [
+        ({"lam": 10.0, "w_f": 1.0}, 1.4, 0),
+        ({"lam": 23.5, "w_f": 1.28, "C": 0.0115}, 1.85, 0),
+        ({"lam": 3.17445, "w_f": 70.8204, "m_f": 135.257, "C": 24.3601, "w": 0.2482}, 1.05, -1),
+    ],
+)
+def test_branches_are_looked_at_up_to_their_folds(numbers, gamma, end):
+    traced, follower = followed(System.of(**numbers), 0.8 * gamma, 1.25 * gamma, at=gamma)
+    t = float(np.log(1.25))
+    column = min(traced.columns, key=lambda column: abs(column.t - t))
+    beside = []
+    for x in column.x:
+        samples, *folds = follower.through(traced, t, float(x), lambda _: False)
+        at = np.array([sample.t for sample in samples])
+        known = np.sort([*at, *(fold.t for fold in folds if fold is not None)])
+        assert np.diff(known).max() < np.log(1.0101)
+        rho = follower.path.log_rho(np.array([sample.x for sample in samples]), at)[0][:, 0]
+        assert np.abs(rho).max() < 1e-11
+        if folds[end] is not None:
+            beside.append(samples[end])
+    # Two branches come to the fold, and stay two.
+    first, second = beside
+    assert first.t == second.t
+    assert abs(first.x - second.x) > 1e-3
 
 
 @pytest.mark.slow

@@ -25,6 +25,8 @@ SPACING = 0.01
 HALVINGS, ROUNDS = 12, 40
 # Of log gamma, at which an edge is found, and growth that is none there, in units of Omega.
 SETTLED, NO_GROWTH = 1e-13, 1e-9
+# A step of Newton's method, in log r_f, at most as long as which it ends for want of digits.
+NEAR = 1e-7
 # Circle around two modes that meet without drag, and how far a mode may move from one sample to the next, in units of
 # Omega.
 CIRCLE, FAR = 0.05, 0.2
@@ -165,18 +167,32 @@ class Follower:
         return found, began if 0 in samples else None, ended if len(points) - 1 in samples else None
 
     def _points(self, traced: Trace, places: list[tuple[int, int]]) -> list[tuple[float, float, int]]:
-        """t, x and place of the shapes of a branch, close enough for windows: of columns, and between them."""
+        """t, x and place of the shapes of a branch, close enough for windows: of columns, between them, and on to the
+        folds in which it begins and ends."""
         columns = traced.columns
         known = [(columns[i].t, float(columns[i].x[k]), k, float(columns[i].moves[k])) for i, k in places]
         points = [(t, x, k) for t, x, k, _ in known]
+        guesses: list[tuple[Array, Array, int]] = []
         for (t, x, k, moves), (later, y, _, moved) in pairwise(known):
             step = later - t
             share = np.arange(1, _steps(step)) / _steps(step)
             # The cubic through both.
             bent = (1.0 - share) * (moves * step - (y - x)) + share * ((y - x) - moved * step)
-            guess = x + share * (y - x) + share * (1.0 - share) * bent
-            at = t + share * step
-            points += zip(at, self._offsets(guess, at), [k] * len(at), strict=True)
+            guesses.append((t + share * step, x + share * (y - x) + share * (1.0 - share) * bent, k))
+        for fold, (t, x, k, moves) in zip(_folds(traced, places), (known[0], known[-1]), strict=True):
+            if fold is None:
+                continue
+            step = fold.t - t
+            share = np.arange(1, _steps(abs(step))) / _steps(abs(step))
+            # The parabola with its vertex in the fold, bent to leave the column as the branch does.
+            left = np.sqrt(1.0 - share)
+            bent = -2.0 * moves * step - (x - fold.x)
+            guesses.append((t + share * step, fold.x + left * (x - fold.x) + left * (left - 1.0) * bent, k))
+        for at, guess, k in guesses:
+            found = self._offsets(guess, at)
+            if np.isnan(found).any():
+                raise _LostError("a shape is lost between two that are known")
+            points += zip(at, found, [k] * len(at), strict=True)
         return sorted(points)
 
     def sample(self, t: float, x: float, place: int) -> Sample:
@@ -203,21 +219,26 @@ class Follower:
     def offset(self, a: Sample, b: Sample, t: float) -> float:
         """Log of the radius of the fish of that shape."""
         x = a.x + (t - a.t) / (b.t - a.t) * (b.x - a.x)
-        return float(self._offsets(np.array([x]), np.array([t]))[0])
+        found = float(self._offsets(np.array([x]), np.array([t]))[0])
+        if np.isnan(found):
+            raise _LostError
+        return found
 
     def _offsets(self, x: Array, t: Array) -> Array:
-        """Log of the radius of the fish of shapes near by, by Newton's method."""
-        x, going = x.copy(), np.arange(len(x))
+        """Log of the radius of the fish of shapes near by, by Newton's method; nan where it does not settle."""
+        x, going, last = x.copy(), np.arange(len(x)), np.full(len(x), np.inf)
         for _ in range(ROUNDS):
             ends = self.path.shots(x[going], t[going], SLOPE)
             with np.errstate(divide="ignore", invalid="ignore"):
                 step = ends.log_rho[:, 0] / ends.log_rho[:, 1]
             sound = (ends.status == status.OK) & np.isfinite(step)
             x[going[sound]] -= step[sound]
+            last[going] = np.where(sound, np.abs(step), np.inf)
             going = going[sound & (np.abs(step) >= 8.0 * EPS)]
             if not len(going):
                 break
-        return x
+        # Where rounding is amplified the steps end at its size.
+        return np.where(last < NEAR, x, np.nan)
 
     def modes(self, samples: list[Sample], began: Fold | None, ended: Fold | None) -> list[Mode]:
         """Modes that grow somewhere on a branch."""
@@ -392,7 +413,10 @@ class Follower:
         top = middles[0] + slopes[0] * (middles[1] - middles[0]) / (slopes[0] - slopes[1])
         if not t[0] < top < t[2]:
             return sample, growth
-        there = self.between(mode.samples[k - 1], mode.samples[k + 1], top)
+        try:
+            there = self.between(mode.samples[k - 1], mode.samples[k + 1], top)
+        except _LostError:
+            return sample, growth
         if there.spectrum.unstable < 1:
             return sample, growth
         rate = _nearest(there.spectrum.growing, mode.sigma[k]).real * self.speed(there.t)
