@@ -149,6 +149,18 @@ def at_most(share: float) -> Iterator[None]:
         _budget.reset(token)
 
 
+def each_allowed() -> float:
+    """What each of many computations may take, where only they are limited, and not all of them together.
+
+    Returns
+    -------
+    float
+        CPU time [s], > 0; inf where nothing limits them.
+    """
+    budget = _budget.get()
+    return budget.each if budget is not None and budget.seconds == float("inf") else float("inf")
+
+
 def scaled(limit: int, most: int) -> int:
     """A limit of one call of a kernel, which grows and shrinks with the patience of the caller.
 

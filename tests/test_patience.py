@@ -383,3 +383,13 @@ def test_a_worker_that_takes_too_long_is_killed_and_started_anew(monkeypatch):
     runs = list(random_commands.run_all([long, short, short], 1.0))
     assert runs[0].exit == random_commands.KILLED
     assert [run.exit for run in runs[1:]] == [0, 0]
+
+
+def test_one_of_many_systems_is_given_up_and_the_others_are_as_without_it():
+    speeds = [47.94544119868787, 0.5]
+    with towatlas.patience(math.inf, each=0.05):
+        found = towatlas.equilibria_many(166.20785511752527, 727.7026322970036, speeds, C=0.0027414292615361062)
+    alone = towatlas.equilibria_many(166.20785511752527, 727.7026322970036, speeds[1:], C=0.0027414292615361062)
+    assert found.status.values.tolist() == [status.UNFINISHED, status.OK]
+    assert found["count"].values.tolist() == [0, 1]
+    assert found.r_f.values[1, 0] == alone.r_f.values[0, 0]

@@ -186,8 +186,8 @@ class Follower:
             share = np.arange(1, _steps(abs(step))) / _steps(abs(step))
             # The parabola with its vertex in the fold, bent to leave the column as the branch does.
             left = np.sqrt(1.0 - share)
-            bent = -2.0 * moves * step - (x - fold.x)
-            guesses.append((t + share * step, fold.x + left * (x - fold.x) + left * (left - 1.0) * bent, k))
+            most = -2.0 * moves * step - (x - fold.x)
+            guesses.append((t + share * step, fold.x + left * (x - fold.x) + left * (left - 1.0) * most, k))
         for at, guess, k in guesses:
             found = self._offsets(guess, at)
             if np.isnan(found).any():

@@ -24,8 +24,8 @@ NODES = 6
 # CPU time over the cube of the number of unknowns, measured with 800 to 5500 of them, s.
 SECONDS_A_CUBE = 7e-10
 REMEDY = "a shorter cable or a lower speed has fewer nodes"
-# Rounds of Newton to their places.
-NEWTON = 12
+# Rounds of Newton to their places, parts of a step, and the last one's length.
+NEWTON, PLACED = 12, 1e-12
 # By how much the angle of the cable, the phase of its waves and the logarithm of its tension may change in a panel.
 PANEL = 5.0
 DEGREE = 8
@@ -248,7 +248,9 @@ def _places(motion: Motion, steps: Integers, share: Array) -> tuple[Integers, Ar
         miss = (lengths[k] * all_of).sum(1) * part - target
         low, high = np.where(miss < 0.0, part, low), np.where(miss < 0.0, high, part)
         trial = part - miss / ((motion.series[k, 0] * all_of).sum(1) * motion.sizes[k])
-        part = np.where((trial >= low) & (trial <= high), trial, 0.5 * (low + high))
+        last, part = part, np.where((trial >= low) & (trial <= high), trial, 0.5 * (low + high))
+        if np.abs(part - last).max() < PLACED:
+            break
     return k, part, float(borders[-1])
 
 

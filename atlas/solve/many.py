@@ -75,7 +75,8 @@ def equilibria_many(
     By the search that `equilibria` uses with drag, in a vacuum as well. What is out of range has the status BAD_INPUT
     and no shapes; STEP_LIMIT beside shapes says that a part of the range of r_f could not be searched.
 
-    Work is not limited unless `towatlas.patience` limits it: a system takes some milliseconds, the longest seconds.
+    A system takes some milliseconds, a long one seconds. One whose shots would take more than some 30 s has the status
+    UNFINISHED and no shapes. All of them together are not limited unless `towatlas.patience` limits them.
 
     References
     ----------

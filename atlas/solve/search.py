@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from towatlas.effort import check_foreseen, limited
+from towatlas.effort import check_foreseen, each_allowed, limited
 from towatlas.kernels import status
 from towatlas.kernels.system import C_F, C_T, LAM, M_F, W_F, W
 from towatlas.numerics.hermite import cubic, cubic_coefficients
@@ -108,7 +108,7 @@ class _Search:
     def __init__(self, systems: Array, gamma: Array, first: int):
         self.systems, self.gamma, self.first = systems, gamma, first
         self.scale = np.square(gamma)
-        self.shots = np.zeros(len(gamma), np.int64)
+        self.shots, self.steps = np.zeros((2, len(gamma)), np.int64)
         self.codes = np.full(len(gamma), status.OK)
         self.unsearched = np.full((len(gamma), 2), np.nan)
 
@@ -133,6 +133,7 @@ class _Search:
         """Values at points; shape (9, points)."""
         found = look(np.exp(x), self.gamma[rows], self.systems[rows], rough=rough)
         np.add.at(self.shots, rows, 1)
+        np.add.at(self.steps, rows, found.steps)
         bad = self._note(rows, x, found.status)
         values = np.stack(
             [
@@ -212,6 +213,7 @@ class _Search:
         # Between two shots that failed a third would.
         active = (rows[1:] == rows[:-1]) & ~(failed[1:] & failed[:-1])
         for _ in range(HALVINGS):
+            active &= ~self._gives_up(rows, values, active)[rows[:-1]]
             i = np.flatnonzero(active)
             if not len(i):
                 break
@@ -235,7 +237,17 @@ class _Search:
         # The sides that roots are bracketed by.
         vague = np.flatnonzero((values[8] > 0.0) & (np.abs(values[4]) < NEAR_FOLD))
         values[:, vague] = self._look(rows[vague], x[vague], rough=False)
-        return rows, x, values
+        known = (self.codes != status.UNFINISHED)[rows]
+        return rows[known], x[known], values[:, known]
+
+    def _gives_up(self, rows: Integers, values: Array, active: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Which systems are given up for the steps that one of many may take; noted down."""
+        i = np.flatnonzero(active)
+        steps = _foreseen(values[6:8, i], values[6:8, i + 1], np.ones(len(i)))[1]
+        foreseen = self.steps + np.bincount(rows[i], steps, minlength=len(self.steps))
+        given_up = foreseen > each_allowed() / SECONDS_A_STEP
+        self.codes[given_up] = status.UNFINISHED
+        return np.asarray(given_up)
 
     def _roots(self, rows: Integers, x: Array, values: Array, peaks: tuple[Integers, Array, Array, Integers]) -> tuple:
         """All roots of log rho between the points, extrema solved for first so that they part the pairs."""
@@ -322,15 +334,20 @@ def least_radius(systems: Array, gamma: Array) -> Array:
 
 
 def _check_foreseen(a: Array, b: Array, least: Array, times: float = 1.0) -> None:
-    """Refuse what would take longer than there is patience for, by angle and steps of shots at both ends of intervals,
-    shape (2, ...); at least so many shots in each, and what takes so many times as long."""
-    shots = np.maximum(least, SHOTS_A_RADIAN * np.nan_to_num(np.abs(b[0] - a[0])))
-    steps, count = float(np.sum(shots * 0.5 * (a[1] + b[1])) * times), float(np.sum(shots) * times)
+    """Refuse what would take longer than there is patience for, as `_foreseen`, and so many times as long."""
+    steps, count = (float(np.sum(part) * times) for part in _foreseen(a, b, least)[::-1])
     check_foreseen(
         steps * SECONDS_A_STEP,
         f"shots with drag of about {steps / max(count, 1.0):,.0f} steps, some {float(f'{count:.2g}'):,.0f} of them",
         REMEDY,
     )
+
+
+def _foreseen(a: Array, b: Array, least: Array) -> tuple[Array, Array]:
+    """Shots, and steps of them, in intervals, by angle and steps of shots at both ends, shape (2, ...); at least so
+    many shots in each."""
+    shots = np.maximum(least, SHOTS_A_RADIAN * np.nan_to_num(np.abs(b[0] - a[0])))
+    return shots, shots * 0.5 * (a[1] + b[1])
 
 
 def _to_split(a: Array, b: Array, new: Array, width: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
