@@ -353,3 +353,20 @@ def test_python_of_the_page_runs():
     names: dict = {}
     for block in blocks:
         exec(block, names)
+
+
+@pytest.mark.parametrize(
+    ("lam", "gamma", "C", "r_f"),
+    [
+        # The radius by DOP853 and Radau at 1e-13; between it and the next root the radius dips and rises again.
+        (61.722590714686845, 16.619446962449224, 0.0011481241983754727, 20.316465836838994),
+        (61.95040255693825, 16.607426928719146, 0.0011417557965471877, None),
+        (62.16704896387401, 16.565454347945636, 0.0011548870758175075, None),
+    ],
+)
+def test_every_shape_listed_reaches_the_tow_radius(lam, gamma, C, r_f):
+    found = towatlas.equilibria(lam, 0.0, gamma, C=C)
+    ends = shoot(found.r_f * gamma**2, gamma, System.of(lam, 0.0, C=C).row(), jets_of(1))
+    assert (np.abs(ends.log_rho[:, 0]) < 1e-13 * (1.0 + np.abs(ends.log_rho[:, 1]))).all()
+    if r_f is not None:
+        assert np.abs(found.r_f / r_f - 1.0).min() < 1e-12

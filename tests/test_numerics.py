@@ -208,6 +208,17 @@ def test_a_bracket_without_a_root():
     assert found[1] == 1.0
 
 
+def test_newton_from_where_a_function_falls():
+    """Above the root a step upwards leads to no other end of the bracket: that is not the root."""
+    u = np.linspace(0.0, 5.0, 1001)
+    assert (np.sin(u) + 0.22 * u > 0.0)[1:].all()
+    found, solved = bracket(
+        lambda x, i: (np.sin(x - 1.0) + 0.22 * (x - 1.0), np.cos(x - 1.0) + 0.22), np.zeros(1), np.full(1, 6.0)
+    )
+    assert solved[0]
+    assert found[0] == pytest.approx(1.0, rel=1e-15)
+
+
 def test_a_bracket_of_nothing_but_negative_values():
     """Without slopes the upper end is looked at before an answer is given; a root at it is one."""
     none = np.full(1, np.nan)

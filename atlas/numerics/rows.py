@@ -147,7 +147,8 @@ def bracket(
             step = -value / slope
             between = low[i] - at_low[i] * (high[i] - low[i]) / (at_high[i] - at_low[i])
         known = np.isfinite(slope)
-        trial = np.where(known, np.minimum(x[i] + step, high[i]), between)
+        # Beyond the upper end nothing is sought; a step up from above the root, where the slope falls, is none at all.
+        trial = np.where(known, np.where(above, x[i] + step, np.minimum(x[i] + step, high[i])), between)
         every = np.where(known, HALVED_EVERY, HALVED_EVERY_WITHOUT_SLOPE)
         inside = (trial >= low[i]) & (trial <= high[i]) & (round_ % every != every - 1)
         tiny = np.maximum(4.0 * EPS * np.abs(x[i]), resolution[i])
