@@ -2,6 +2,7 @@
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from towatlas.scene.jumps import answer_scene
 from towatlas.scene.units import parse_quantity
 from towatlas.solve.batches import batches
 from towatlas.solve.critical import solve_rows
+from towatlas.solve.growth import Spectrum
 from towatlas.solve.jets import jets_of
 from towatlas.solve.members import expected_work, shoot_lanes, shoot_singly
 from towatlas.solve.passed import folds_passed, guess_passed, guess_speed
@@ -393,3 +395,12 @@ def test_one_of_many_systems_is_given_up_and_the_others_are_as_without_it():
     assert found.status.values.tolist() == [status.UNFINISHED, status.OK]
     assert found["count"].values.tolist() == [0, 1]
     assert found.r_f.values[1, 0] == alone.r_f.values[0, 0]
+
+
+def test_growth_rates_that_cannot_be_had_take_time_too():
+    """A shape of too many steps has a status, and costs what they took: many such are no reason to go on."""
+    system = System.of(10.0, 1.0)
+    lost = replace(Spectrum(system, 1.4, 0.5).motion(1.0), status=status.STEP_LIMIT)
+    assert Spectrum(system, 1.4, 0.5, motion=lost).status == status.STEP_LIMIT
+    with patience(1e-9), pytest.raises(TooMuchWork, match="growth rates"):
+        Spectrum(system, 1.4, 0.5, motion=lost)

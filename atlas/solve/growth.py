@@ -142,6 +142,7 @@ class Spectrum:
         self.guesses: Modes | None = None
         self.reach = reach_of(system, gamma)
         self.motion = lambda reach: motions(np.array([r_f]), np.array([gamma]), system.row()[None], reach)[0]
+        check_patience("growth rates", REMEDY)
         motion = motion or self.motion(self.reach)
         self.status = motion.status
         if motion.status != status.OK:
