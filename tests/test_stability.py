@@ -379,7 +379,7 @@ class TestCommand:
         assert "flutter" in out.splitlines()[2]
 
     def test_what_patience_allows_for(self, capsys, monkeypatch):
-        """The shape that is expected first; what is left over is said once, and the exit code."""
+        """The shape that is expected first, then few nodes; what is left over is said once, and the exit code."""
         done = []
 
         def some(found, k, motion):
@@ -393,10 +393,11 @@ class TestCommand:
         code, out, said = run(capsys, *ask)
         rows = json.loads(out)
         assert code == 1
-        assert done == [2, 1]
-        assert [row["status"] for row in rows] == ["unfinished", "computed", "computed", "unfinished", "unfinished"]
+        assert done == [2, 4]
+        assert [row["status"] for row in rows] == ["unfinished", "unfinished", "computed", "unfinished", "computed"]
         assert rows[2]["kind"] == "flutter"
         assert said.count("not finished within the patience") == 1
+        assert "of 3 of 5 shapes none was looked for" in said
         code, out, said = run(capsys, *ask)
         assert (code, out, "over" in said) == (1, "", True)
 

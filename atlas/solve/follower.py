@@ -292,8 +292,8 @@ class Follower:
 
     def _zero_growth(self, still: Sample, growing: Sample, sigma: complex) -> tuple[float, complex]:
         """The same by secants that keep their bracket, and the growth rate where they end."""
-        damped = still.spectrum.roots.sigma[still.spectrum.roots.sigma.real <= 0.0]
-        ends = [(still.t, _nearest(damped, sigma)), (growing.t, sigma)]
+        others = np.concatenate([still.spectrum.roots.sigma, still.spectrum.rest])
+        ends = [(still.t, _nearest(others[others.real <= 0.0], sigma)), (growing.t, sigma)]
         heights = [ends[0][1].real, sigma.real]
         t, here, side = growing.t, sigma, 1
         for _ in range(ROUNDS):

@@ -108,8 +108,8 @@ def stability_of(found: Equilibria) -> Stability:
     with patience():
         reach = reach_of(system, found.gamma)
         moved = motions(found.r_f, np.full(count, found.gamma), np.tile(system.row(), (count, 1)), reach)
-        # The one that is expected to be seen first, in case the patience ends.
-        for done, k in enumerate(sorted(range(count), key=lambda k: abs(k - found.expected))):
+        # In case the patience ends: the one that is expected to be seen, then those of few nodes, which are quick.
+        for done, k in enumerate(sorted(range(count), key=lambda k: (k != found.expected, found.nodes[k]))):
             try:
                 check_patience("growth rates of the shapes", REMEDY, done=done, of=count)
                 answer = spectrum_of(found, k, moved[k])
@@ -125,8 +125,12 @@ def stability_of(found: Equilibria) -> Stability:
                 sigmas[k] = roots.sigma * speed
                 growth[k], frequency[k] = sigmas[k][0].real, sigmas[k][0].imag
                 error[k] = max(roots.error[0], found.error[k]) * speed
-    if late is not None and (codes == status.UNFINISHED).all():
+    left = int((codes == status.UNFINISHED).sum())
+    if late is not None and left == count:
         raise late
+    scope = looked_at(found) + (
+        f"; of {left} of {count} shapes none was looked for, as the patience ended" * (left > 0)
+    )
     return Stability(
         found,
         growth,
@@ -137,7 +141,7 @@ def stability_of(found: Equilibria) -> Stability:
         error,
         codes,
         tuple(sigmas),
-        looked_at(found),
+        scope,
     )
 
 
