@@ -401,5 +401,19 @@ class TestCommand:
         code, out, said = run(capsys, *ask)
         assert (code, out, "over" in said) == (1, "", True)
 
+    def test_motions_of_many_shapes_are_not_made_at_once(self, monkeypatch):
+        """Those of thousands take longer than the patience, and more memory than there is."""
+        found, made = towatlas.equilibria(12.0, 0.01, 8.0), []
+
+        def some(r_f, *rest):
+            made.append(len(r_f))
+            return motions(r_f, *rest)
+
+        monkeypatch.setattr(sys.modules["towatlas.solve.stability"], "motions", some)
+        answer = towatlas.stability_of(found)
+        assert (answer.status == status.OK).all()
+        assert len(found) > 8
+        assert made == [8] * (len(found) // 8) + [len(found) % 8] * (len(found) % 8 > 0)
+
     def test_what_is_refused(self, capsys):
         assert run(capsys, "stability", "--lam=-3", "--wf=0.2", "--gamma=0.3")[0] == 2

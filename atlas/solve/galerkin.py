@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import legendre
 
-from towatlas.effort import check_foreseen
+from towatlas.effort import TooMuchWork, check_foreseen, each_allowed
 from towatlas.solve.motion import Array, Complex, Integers, Motion
 
 # Gauss nodes a panel beyond the degree.
@@ -96,7 +96,10 @@ def modes(motion: Motion, refined: int = 0) -> Modes:
     """
     degree, panel = DEGREE + 3 * refined, PANEL / 1.5**refined
     unknowns = 2 * (degree + 1) * int(_panel_of_step(motion, panel)[-1] + 1)
-    check_foreseen(SECONDS_A_CUBE * unknowns**3, f"modes of {unknowns} unknowns", REMEDY)
+    seconds = SECONDS_A_CUBE * unknowns**3
+    check_foreseen(seconds, f"modes of {unknowns} unknowns", REMEDY)
+    if seconds > each_allowed():
+        raise TooMuchWork(f"modes of {unknowns} unknowns are too many for one of many shapes")
     with _one_blas_thread:
         return _modes(motion, refined, degree, panel)
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from towatlas.effort import check_patience
+from towatlas.effort import TooMuchWork, check_patience
 from towatlas.kernels import status
 from towatlas.solve.galerkin import Modes, modes
 from towatlas.solve.motion import Array, Complex, Motion, motions
@@ -153,8 +153,14 @@ class Spectrum:
         if motion.status != status.OK:
             return
         for refined in range(REFINEMENTS):
-            check_patience("growth rates", REMEDY)
-            guesses = self.guesses = modes(motion, refined)
+            try:
+                check_patience("growth rates", REMEDY)
+                guesses = self.guesses = modes(motion, refined)
+            except TooMuchWork:
+                # What is known already is told, as not counted.
+                if not len(self.roots):
+                    raise
+                return
             if self._counted(motion, guesses):
                 self.status = status.OK
                 return
