@@ -63,6 +63,8 @@ class _Budget:
 
 
 _budget: ContextVar[_Budget | None] = ContextVar("towatlas_patience", default=None)
+# Steps of shots that are left of those that `counted` allows.
+_left: ContextVar[list[float] | None] = ContextVar("towatlas_steps", default=None)
 _listener: Callable[[Progress | None], object] = repr
 
 
@@ -159,6 +161,51 @@ def each_allowed() -> float:
     """
     budget = _budget.get()
     return budget.each if budget is not None and budget.seconds == float("inf") else float("inf")
+
+
+@contextmanager
+def counted(steps: float) -> Iterator[None]:
+    """Allow what is within so many steps of shots: counted, for time is not the same on any two runs.
+
+    Parameters
+    ----------
+    steps : float
+        > 0; inf for no limit.
+
+    Returns
+    -------
+    context manager
+        For `with`.
+
+    Raises
+    ------
+    TooMuchWork
+        By what shoots within.
+    """
+    token = _left.set([steps])
+    try:
+        yield
+    finally:
+        _left.reset(token)
+
+
+def count_steps(steps: float) -> None:
+    """Take steps off those that `counted` allows.
+
+    Parameters
+    ----------
+    steps : float
+        That were made, >= 0.
+
+    Raises
+    ------
+    TooMuchWork
+        If they were more than there were.
+    """
+    if (left := _left.get()) is not None:
+        left[0] -= steps
+        if left[0] < 0.0:
+            raise TooMuchWork("more steps of shots than one of many computations may take")
 
 
 def scaled(limit: int, most: int) -> int:

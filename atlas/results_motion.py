@@ -88,7 +88,7 @@ class Window:
     Attributes
     ----------
     branch : str
-        Name of the shape where it grows most, as of `Equilibria`.
+        Its name, as of `Branch`.
     nodes : int
         Its nodes [-], >= 0.
     low, high : float
@@ -235,7 +235,8 @@ class Branch:
     Attributes
     ----------
     name : str
-        Where that is highest, as of `Equilibria`.
+        In a vacuum as of `Equilibria`; with drag that where the branch begins, and, where a fold does that, the value
+        there: "shape 1 from 6.8106". No two branches of one answer have the same.
     value : ndarray, shape (samples,)
         Of what moves, rising, as of `Diagram`.
     gamma : ndarray, shape (samples,)
@@ -394,7 +395,7 @@ def dataset_of(branches: tuple[Branch, ...], moved: str, units: dict[str, str]) 
     kinds = [[point.kind for point in b.points] + [""] * (points - len(b.points)) for b in branches]
     variables["point_kind"] = (("branch", "point"), np.array(kinds, np.str_), {"long_name": "what is there"})
     names = np.array([branch.name for branch in branches], np.str_)
-    variables["name"] = (("branch",), names, {"long_name": "name of the branch where what moves is highest"})
+    variables["name"] = (("branch",), names, {"long_name": "name of the branch"})
     return xarray.Dataset(variables, attrs={"title": "Branches of shapes of a towed cable", "Conventions": "CF-1.11"})
 
 

@@ -94,9 +94,9 @@ def _grid(speeds: int, drags: int) -> Target:
     return _allowed("systems of a grid, 10 CPU minutes for 100,000", 600.0 / MANY, used, note)
 
 
-def _growth(cables: int, speeds: int) -> list[Target]:
+def _growth(rows: int, speeds: int) -> list[Target]:
     """Growth rates of the shapes of neighbours: a few cables, each at speeds half a percent apart."""
-    lam, gamma = np.linspace(35.0, 40.0, cables)[:, None], 4.0 * 1.005 ** np.arange(speeds)
+    lam, gamma = np.linspace(35.0, 40.0, rows)[:, None], 4.0 * 1.005 ** np.arange(speeds)
     found = []
     for name, c in (("in a vacuum", 0.0), ("in air, C 0.018", 0.018)):
         towatlas.stability_many(lam[:1], 1352.0, gamma[:2], C=c)
@@ -117,7 +117,18 @@ def _growth(cables: int, speeds: int) -> list[Target]:
         )
         allowed = 600.0 / MANY
         found.append(_allowed(f"growth rates of neighbours {name}, shapes included", allowed, used / shapes, note))
+        cables = zip(lam[:, 0], np.linspace(4.0, 7.0, len(lam)), strict=True)
+        found.append(_alone(name, [towatlas.equilibria(length, 1352.0, speed, C=c) for length, speed in cables]))
     return found
+
+
+def _alone(name: str, found: list[towatlas.Equilibria]) -> Target:
+    """Growth rates of the shapes of cables, one cable after the other."""
+    times = [min(_cpu(lambda one=one: towatlas.stability_of(one)) for _ in range(3)) for one in found]
+    shapes = sum(len(one) for one in found)
+    used = sum(times) / shapes
+    note = f"{1e3 * used:.1f} ms, {shapes} shapes of {len(found)} cables, lam 35 to 40, w_f 1352, gamma 4 to 7"
+    return _allowed(f"leading eigenvalue and count of a shape {name}, 5 ms", 5e-3, used, note)
 
 
 def _shots(rows: int) -> list[Target]:

@@ -71,9 +71,7 @@ from towatlas.kernels.drag import (
     X,
     Y,
     advance_jets,
-    clear,
     expand_jets,
-    run,
     step_lengths,
     values,
 )
@@ -160,12 +158,33 @@ LEFT, LARGER = 1e-15, 4.0
 
 
 @helper
-def _expand_matrices(c, p, algebra, groups):
-    """Series of the matrices, after those of the shot."""
-    for k in range(np.int64(ORDER)):
-        clear(c, np.int64(QUANTITIES), ALL_QUANTITIES, np.int64(1), k)
-        store(c, UNIT * KEPT + k, broadcast(1.0 if k == 0 else 0.0))
-        run(c, p, MATRICES, k, algebra.products, algebra.pairs, np.int64(1), groups)
+def _expand_matrices(c, p, groups):
+    """Series of the matrices, after those of the shot, row by row: all they are made of is known to all orders."""
+    for place in range(QUANTITIES * KEPT, ALL_QUANTITIES * KEPT):
+        store(c, place, broadcast(0.0))
+    store(c, UNIT * KEPT, broadcast(1.0))
+    for row in range(MATRICES.shape[0]):
+        operation, factor = MATRICES[row, 0], np.float64(MATRICES[row, 4])
+        a, b, q = MATRICES[row, 1] * KEPT, MATRICES[row, 2] * KEPT, MATRICES[row, 3] * KEPT
+        if not groups[MATRICES[row, 5]]:
+            continue
+        if operation == PRODUCT:
+            for k in range(np.int64(ORDER)):
+                one = broadcast(0.0)
+                for o in range(k + 1):
+                    one = one + load(c, a + o) * load(c, b + k - o)
+                store(c, q + k, load(c, q + k) + factor * one)
+        elif operation == SCALED:
+            weight = factor * load(p, MATRICES[row, 1])
+            for k in range(np.int64(ORDER)):
+                store(c, q + k, load(c, q + k) + weight * load(c, b + k))
+        else:
+            # RATIO
+            for k in range(np.int64(ORDER)):
+                one = load(c, a + k)
+                for o in range(k):
+                    one = one - load(c, q + o) * load(c, b + k - o)
+                store(c, q + k, one / load(c, b))
 
 
 @helper
@@ -260,7 +279,7 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
         busy = True
         while busy:
             expand_jets(c, p, algebra.products, algebra.pairs, count, groups)
-            _expand_matrices(c, p, algebra, groups)
+            _expand_matrices(c, p, groups)
             step_lengths(c, p, count, TRUNCATION, room, h)
             for lane in range(LANES):
                 if jobs[lane] != IDLE:
@@ -342,31 +361,41 @@ def _march_step(series, size, drag, terms, eta, phi, zeta, alpha, real, imaginar
         at, ahead = k * SIX, (k + 1) * SIX
         _turn(eta, zeta, at, real, imaginary)
         _turn(zeta, alpha, at, real, imaginary)
-        for part in range(2):
-            e0 = e1 = e2 = f0 = f1 = f2 = broadcast(0.0)
-            for o in range(k + 1):
-                back = (k - o) * SIX + part
-                t = series[0, o]
-                f0 = f0 - t * load(alpha, back)
-                f1 = f1 - t * load(alpha, back + TWO)
-                f2 = f2 - t * load(alpha, back + 4)
-                for j in range(3):
-                    q = load(phi, back + 2 * j)
-                    e0 = e0 - series[1 + j, o] * q
-                    e1 = e1 - series[4 + j, o] * q
-                    e2 = e2 - series[7 + j, o] * q
-                    if drag:
-                        z = load(zeta, back + 2 * j)
-                        f0 = f0 + series[19 + j, o] * q - series[10 + j, o] * z
-                        f1 = f1 + series[22 + j, o] * q - series[13 + j, o] * z
-                        f2 = f2 + series[25 + j, o] * q - series[16 + j, o] * z
-            share = size / (k + 1)
-            store(eta, ahead + part, e0 * share)
-            store(eta, ahead + TWO + part, e1 * share)
-            store(eta, ahead + 4 + part, e2 * share)
-            store(phi, ahead + part, f0 * share)
-            store(phi, ahead + TWO + part, f1 * share)
-            store(phi, ahead + 4 + part, f2 * share)
+        # Real and imaginary parts side by side: sums that wait for each other would take twice as long.
+        e0 = e1 = e2 = f0 = f1 = f2 = broadcast(0.0)
+        g0 = g1 = g2 = h0 = h1 = h2 = broadcast(0.0)
+        for o in range(k + 1):
+            back = (k - o) * SIX
+            t = series[0, o]
+            f0, h0 = f0 - t * load(alpha, back), h0 - t * load(alpha, back + 1)
+            f1, h1 = f1 - t * load(alpha, back + 2), h1 - t * load(alpha, back + 3)
+            f2, h2 = f2 - t * load(alpha, back + 4), h2 - t * load(alpha, back + 5)
+            for j in range(3):
+                q, r = load(phi, back + 2 * j), load(phi, back + 2 * j + 1)
+                e0, g0 = e0 - series[1 + j, o] * q, g0 - series[1 + j, o] * r
+                e1, g1 = e1 - series[4 + j, o] * q, g1 - series[4 + j, o] * r
+                e2, g2 = e2 - series[7 + j, o] * q, g2 - series[7 + j, o] * r
+                if drag:
+                    y, z = load(zeta, back + 2 * j), load(zeta, back + 2 * j + 1)
+                    f0 = f0 + series[19 + j, o] * q - series[10 + j, o] * y
+                    h0 = h0 + series[19 + j, o] * r - series[10 + j, o] * z
+                    f1 = f1 + series[22 + j, o] * q - series[13 + j, o] * y
+                    h1 = h1 + series[22 + j, o] * r - series[13 + j, o] * z
+                    f2 = f2 + series[25 + j, o] * q - series[16 + j, o] * y
+                    h2 = h2 + series[25 + j, o] * r - series[16 + j, o] * z
+        share = size / (k + 1)
+        store(eta, ahead, e0 * share)
+        store(eta, ahead + 1, g0 * share)
+        store(eta, ahead + 2, e1 * share)
+        store(eta, ahead + 3, g1 * share)
+        store(eta, ahead + 4, e2 * share)
+        store(eta, ahead + 5, g2 * share)
+        store(phi, ahead, f0 * share)
+        store(phi, ahead + 1, h0 * share)
+        store(phi, ahead + 2, f1 * share)
+        store(phi, ahead + 3, h1 * share)
+        store(phi, ahead + 4, f2 * share)
+        store(phi, ahead + 5, h2 * share)
     for i in range(SIX):
         u = v = broadcast(0.0)
         for k in range(terms, -1, -1):

@@ -39,6 +39,32 @@ def test_samples_are_what_stability_says(found):
             assert here.growth[k] == pytest.approx(branch.growth[i], abs=1e-9)
 
 
+def test_growth_between_samples_is_heard(monkeypatch):
+    """All samples of the first shape are below the bound of weak growth, its top is not: as `flutter` says."""
+    for module in ("growth", "follower"):
+        monkeypatch.setattr(f"towatlas.solve.{module}.WEAK", 0.010295)
+    found = towatlas.diagram(37.8, 1352.0, (4.79, 4.9), C=0.018)
+    (first,) = (branch for branch in found.branches if branch.name == "shape 1")
+    assert set(first.kind) == {"weak"}
+    assert set(first.between) == {"flutter"}
+    windows = towatlas.flutter(37.8, 1352.0, (4.79, 4.9), C=0.018).windows
+    assert [window.weak for window in windows if window.branch == "shape 1"] == [False]
+
+
+def test_no_two_branches_have_one_name():
+    """With drag the number of a shape is another's after a fold."""
+    found = towatlas.diagram(4.0, 1.0, (0.4, 1.2), C=0.05)
+    (fold,) = {point.value for branch in found.branches for point in branch.points if point.kind == "fold"}
+    names = sorted(branch.name for branch in found.branches)
+    assert names == ["shape 1", f"shape 1 from {fold:.5g}", f"shape 2 from {fold:.5g}"]
+    windows = towatlas.flutter(4.0, 1.0, (0.4, 1.2), C=0.05).windows
+    assert {window.branch for window in windows} <= set(names)
+    for branch in found.branches:
+        shapes = towatlas.equilibria(4.0, 1.0, float(branch.gamma[0]), C=0.05)
+        k = list(shapes.branch).index(" ".join(branch.name.split()[:2]))
+        assert shapes.r_f[k] == pytest.approx(branch.r_f[0], rel=1e-9)
+
+
 def test_folds_join_two_branches(found):
     fold = towatlas.folds(10.0, 1.0, gamma=(0.3, 0.8))
     ends = [point for branch in found.branches for point in branch.points if point.kind == "fold"]

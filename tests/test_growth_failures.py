@@ -9,10 +9,13 @@ from test_stability import AIR, galerkin, motion_of
 
 import towatlas
 from benchmarks.stability import CASES, reference
+from towatlas.kernels import status
 from towatlas.solve.equilibria import solve_equilibria
+from towatlas.solve.galerkin import modes
 from towatlas.solve.growth import Spectrum
 from towatlas.solve.motion import BOUND, motions
 from towatlas.solve.spectrum import polish, together
+from towatlas.solve.stability import spectrum_of
 from towatlas.system import System
 
 # Largest |sigma| that the program looks at, over gamma.
@@ -137,3 +140,34 @@ def test_slow_growth_beside_a_fold_where_drag_is_strong():
             assert [(one.status, one.unstable) for one in spectra] == [(0, 0), (0, 1), (0, 0)]
             growth.append(spectra[1].roots.sigma[0].real)
         assert growth[1] / growth[0] == pytest.approx(10.0, rel=0.05)
+
+
+def test_zeros_of_a_large_circle_that_are_none():
+    """Close modes in a row are solved for on one circle, on which a series of D told of a zero that is none."""
+    found = towatlas.equilibria(34.635304334805816, 6.612875598787776, 7.942160987456679, C=0.008084245330765339)
+    with towatlas.patience(20):
+        one = spectrum_of(found, list(found.branch).index("shape 3"))
+    assert (one.status, one.unstable) == (status.OK, 14)
+    # From an independent program.
+    growing = one.growing * found.gamma
+    assert np.abs(growing[:2] - np.array([0.163545702 + 0.655993436j, 0.120420147 + 1.578231081j])).max() < 1e-8
+
+
+def test_what_is_known_is_told_where_the_patience_ends(monkeypatch):
+    """Of a shape whose growth rates are not counted yet."""
+    found = towatlas.equilibria(6.0, 2.0, 1.5, C=0.3)
+    whole = spectrum_of(found, 0)
+    asked = []
+
+    def some(motion, refined):
+        asked.append(refined)
+        if refined:
+            raise towatlas.TooMuchWork("over")
+        return modes(motion, refined)
+
+    monkeypatch.setattr("towatlas.solve.growth.modes", some)
+    monkeypatch.setattr("towatlas.solve.growth.count_growing", lambda motion, known: None)
+    one = spectrum_of(found, 0)
+    assert asked == [0, 1]
+    assert (one.status, one.unstable) == (status.NOT_COUNTED, whole.unstable)
+    assert one.roots.sigma[0] == whole.roots.sigma[0]

@@ -18,7 +18,7 @@ from towatlas.maps.build import build_map
 from towatlas.maps.folds import NotInMap
 from towatlas.maps.lookup import OutsideMap
 from towatlas.maps.spec import make_spec
-from towatlas.maps.tiles import tile_path
+from towatlas.maps.tiles import compute_tile, tile_path
 from towatlas.scene.file import scene_of_text
 from towatlas.solve.folds import folds_in_speed
 from towatlas.system import System
@@ -124,6 +124,27 @@ def test_the_vacuum_in_a_map(tmp_path):
     build_map(make_spec(spec), tmp_path / "map")
     found = towatlas.open_map(tmp_path / "map").folds(System.of(7.0, 1.0), 0.1, 5.0)
     assert (found.n.tolist(), set(found.origin)) == ([1, 2, 3], {"vacuum"})
+
+
+def test_one_that_takes_too_many_steps_is_given_up(monkeypatch):
+    """By its steps, the same anywhere, and it alone: no shot with drag is made for a vacuum."""
+    spec = make_spec(
+        {
+            "fields": ["folds", "origin"],
+            "system": {"w_f": 1, "lam": 4},
+            "axes": {"C": [0, 0.05]},
+            "folds": {"from": 0.1, "to": 2, "checks": 0},
+        }
+    )
+    whole = compute_tile(spec, 0)
+    assert whole["folds_status"].tolist() == [status.OK, status.OK]
+    assert whole["folds"].tolist() == [1, 1]
+    monkeypatch.setattr("towatlas.maps.tiles.SECONDS_A_STEP", 1.0)
+    some = compute_tile(spec, 0)
+    assert some["folds_status"].tolist() == [status.OK, status.UNFINISHED]
+    assert some["folds"].tolist() == [1, 0]
+    assert np.isnan(some["fold_gamma"][1]).all()
+    np.testing.assert_array_equal(some["fold_gamma"][0, 0], whole["fold_gamma"][0, 0])
 
 
 def test_never_where_folds_are_others(known):

@@ -379,7 +379,7 @@ class TestCommand:
         assert "flutter" in out.splitlines()[2]
 
     def test_what_patience_allows_for(self, capsys, monkeypatch):
-        """The shape that is expected first; what is left over is said once, and the exit code."""
+        """The shape that is expected first, then few nodes; what is left over is said once, and the exit code."""
         done = []
 
         def some(found, k, motion):
@@ -393,12 +393,27 @@ class TestCommand:
         code, out, said = run(capsys, *ask)
         rows = json.loads(out)
         assert code == 1
-        assert done == [2, 1]
-        assert [row["status"] for row in rows] == ["unfinished", "computed", "computed", "unfinished", "unfinished"]
+        assert done == [2, 4]
+        assert [row["status"] for row in rows] == ["unfinished", "unfinished", "computed", "unfinished", "computed"]
         assert rows[2]["kind"] == "flutter"
         assert said.count("not finished within the patience") == 1
+        assert "of 3 of 5 shapes none was looked for" in said
         code, out, said = run(capsys, *ask)
         assert (code, out, "over" in said) == (1, "", True)
+
+    def test_motions_of_many_shapes_are_not_made_at_once(self, monkeypatch):
+        """Those of thousands take longer than the patience, and more memory than there is."""
+        found, made = towatlas.equilibria(12.0, 0.01, 8.0), []
+
+        def some(r_f, *rest):
+            made.append(len(r_f))
+            return motions(r_f, *rest)
+
+        monkeypatch.setattr(sys.modules["towatlas.solve.stability"], "motions", some)
+        answer = towatlas.stability_of(found)
+        assert (answer.status == status.OK).all()
+        assert len(found) > 8
+        assert made == [8] * (len(found) // 8) + [len(found) % 8] * (len(found) % 8 > 0)
 
     def test_what_is_refused(self, capsys):
         assert run(capsys, "stability", "--lam=-3", "--wf=0.2", "--gamma=0.3")[0] == 2

@@ -59,14 +59,15 @@ def _row(window: Window) -> dict[str, Any]:
 
 
 def _print_table(rows: list[dict[str, Any]]) -> None:
+    wide = max([8, *(len(row["branch"]) for row in rows)])
     print(
-        f"{'branch':>8} {'nodes':>5} {'from':>16} {'':>7} {'to':>16} {'':>7} {'frequency':>21} {'growth':>11} "
+        f"{'branch':>{wide}} {'nodes':>5} {'from':>16} {'':>7} {'to':>16} {'':>7} {'frequency':>21} {'growth':>11} "
         f"{'at gamma':>9}"
     )
     for row in rows:
         frequency = f"{row['frequency_from']:.6g} to {row['frequency_to']:.6g}"
         print(
-            f"{row['branch']:>8} {row['nodes']:>5} {row['from']:>16.11g} {row['from_kind']:>7} {row['to']:>16.11g} "
-            f"{row['to_kind']:>7} {frequency:>21} {row['growth_max']:>11.6g} {row['gamma_max']:>9.5g}"
-            f"{'  weak' if row['weak'] else ''}"
+            f"{row['branch']:>{wide}} {row['nodes']:>5} {row['from']:>16.11g} {row['from_kind']:>7} "
+            f"{row['to']:>16.11g} {row['to_kind']:>7} {frequency:>21} {row['growth_max']:>11.6g} "
+            f"{row['gamma_max']:>9.5g}{'  weak' if row['weak'] else ''}"
         )

@@ -22,6 +22,9 @@ from towatlas.kernels import status
 from towatlas.results_motion import Stability
 from towatlas.tables.atlas import open_atlas
 
+# Of shapes that are said something of so many are named.
+NAMED = 8
+
 
 def add(commands: Any) -> None:
     """Declare the command."""
@@ -58,7 +61,8 @@ def _run(options: argparse.Namespace) -> int:
         _print_table(rows)
     for code in np.unique(found.status[found.status != status.OK]):
         some = found.equilibria.branch[found.status == code]
-        say(f"{', '.join(map(str, some))}: {status.SENTENCES[int(code)]}")
+        more = f" and {len(some) - NAMED} more" if len(some) > NAMED else ""
+        say(f"{', '.join(map(str, some[:NAMED]))}{more}: {status.SENTENCES[int(code)]}")
     say(f"looked at: {found.looked_at}")
     unfinished = (found.status == status.UNFINISHED).any()
     return OK if (found.status == status.OK).any() and not unfinished else FAILED

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from towatlas.effort import SECONDS, patience
+from towatlas.effort import SECONDS, TooMuchWork, counted, each_allowed, patience
 from towatlas.kernels import status
 from towatlas.maps.layout import CURVES, KINDS, place_of, variables
 from towatlas.maps.systems import Spec, system_of
@@ -22,8 +22,10 @@ from towatlas.results import Equilibria
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.folds import folds_in_speed
 from towatlas.solve.many import equilibria_many
+from towatlas.solve.search import SECONDS_A_STEP
 from towatlas.solve.shapes import shape_of
 from towatlas.solve.spectra import stability_many
+from towatlas.system import System
 
 Columns = dict[str, NDArray[Any]]
 Numbers = dict[str, NDArray[np.float64]]
@@ -105,7 +107,7 @@ def _missing(array: NDArray[Any]) -> Any:
     return {"f": np.nan, "i": -1 if array.dtype == np.int32 else 0}[array.dtype.kind]
 
 
-def _nothing(spec: Spec, stage: str) -> Columns:
+def _nothing(spec: Spec, stage: str, code: int = status.NOT_CONVERGED) -> Columns:
     """Of one system that cannot be computed."""
     width = {"shape": 0, "fold": 0, "station": spec.stations}
     found = {
@@ -113,7 +115,7 @@ def _nothing(spec: Spec, stage: str) -> Columns:
         for name, variable in variables(spec).items()
         if variable.stage == stage
     }
-    found["status" if stage == "shapes" else "folds_status"][:] = status.NOT_CONVERGED
+    found["status" if stage == "shapes" else "folds_status"][:] = code
     return found
 
 
@@ -173,22 +175,32 @@ def _curve(found: Equilibria, k: int, s: NDArray[np.float64]) -> dict[str, Any]:
 
 
 def _folds(spec: Spec, numbers: Numbers) -> Columns:
+    rows = [_folds_of(spec, system_of(numbers, i)[0]) for i in range(len(numbers["lam"]))]
+    return {name: np.concatenate(padded([row[name] for row in rows], 1)) for name in rows[0]}
+
+
+def _folds_of(spec: Spec, system: System) -> Columns:
+    """Of one system; it is given up after as many steps as one of many may take."""
     assert spec.span is not None
     low, high = sorted(spec.span, key=abs)
     named = "origin" in spec.fields
-    found = [folds_in_speed(system_of(numbers, i)[0], low, high, named) for i in range(len(numbers["lam"]))]
-    columns: dict[str, list[NDArray[Any]]] = {
-        "fold_gamma": [one.gamma for one in found],
-        "fold_r_f": [one.r_f for one in found],
-        "fold_change": [(one.shapes_above - one.shapes_below).astype(np.int8) for one in found],
-        "fold_below": [one.shapes_below.astype(np.int32) for one in found],
-        "fold_error": [one.error for one in found],
+    try:
+        with counted(each_allowed() / SECONDS_A_STEP):
+            found = folds_in_speed(system, low, high, named)
+    except TooMuchWork:
+        return _nothing(spec, "folds", status.UNFINISHED)
+    columns: Columns = {
+        "fold_gamma": found.gamma,
+        "fold_r_f": found.r_f,
+        "fold_change": (found.shapes_above - found.shapes_below).astype(np.int8),
+        "fold_below": found.shapes_below.astype(np.int32),
+        "fold_error": found.error,
     }
     if named:
-        columns["fold_n"] = [one.n.astype(np.int32) for one in found]
-    return {name: np.concatenate(padded([one[None] for one in column], 1)) for name, column in columns.items()} | {
-        "folds": np.array([len(one) for one in found], np.int32),
-        "folds_status": np.array([status.OK if one.complete else status.NOT_COUNTED for one in found], np.int8),
+        columns["fold_n"] = found.n.astype(np.int32)
+    return {name: column[None] for name, column in columns.items()} | {
+        "folds": np.array([len(found)], np.int32),
+        "folds_status": np.array([status.OK if found.complete else status.NOT_COUNTED], np.int8),
     }
 
 

@@ -39,7 +39,7 @@ MARKERS = {"fold": ("o", "fold"), "hopf": ("D", "Hopf point"), "krein": ("D", "K
 MARK: dict[str, Any] = {"color": "white", "markeredgecolor": "0.15", "markersize": 4.5}
 WIDE = 30.0
 # Values of special points next to each other than this part of the axis are not both written.
-APART = 0.035
+APART = 0.016
 
 
 def plot_diagram(found: "Diagram | SceneDiagram", axes: Axes, show: str = "r_f") -> list[Line2D]:
@@ -62,6 +62,8 @@ def plot_diagram(found: "Diagram | SceneDiagram", axes: Axes, show: str = "r_f")
     unit, size = getattr(found, "unit", ""), getattr(found, "size", 1.0)
     field, plain, named, logarithmic = SHOWN[show]
     lines, kinds, marks = [], set(), {}
+    # What is said first where there is no room for all: folds, then where a shape begins or ceases to last.
+    rank: dict[float, int] = {}
     every = np.concatenate([getattr(branch, field) for branch in found.branches])
     for branch in found.branches:
         heights = getattr(branch, field)
@@ -70,9 +72,12 @@ def plot_diagram(found: "Diagram | SceneDiagram", axes: Axes, show: str = "r_f")
             values = np.array([low.value, *branch.value[inside], high.value]) / size
             lines += axes.plot(values, [getattr(low, field), *heights[inside], getattr(high, field)], **STYLES[kind])
             kinds.add(kind)
-        for point in branch.points:
+        for k, point in enumerate(branch.points):
             if point.kind in MARKERS:
-                marks[point.value / size, getattr(point, field)] = point.kind
+                value = point.value / size
+                marks[value, getattr(point, field)] = point.kind
+                sides = {kind in LASTING for kind in branch.between[max(0, k - 1) : k + 1]}
+                rank[value] = min(rank.get(value, 2), 0 if point.kind == "fold" else 3 - len(sides))
     axes.set_xlim(found.low / size, found.high / size)
     if logarithmic and every.min() > 0.0 and every.max() > WIDE * every.min():
         axes.set_yscale("log")
@@ -84,7 +89,7 @@ def plot_diagram(found: "Diagram | SceneDiagram", axes: Axes, show: str = "r_f")
     for value, start, end in jumps:
         arrow = {"arrowstyle": "-|>", "color": "#a61e3c", "linewidth": 1.2}
         axes.annotate("", (value / size, end), (value / size, start), arrowprops=arrow)
-    _write_values(axes, sorted({value for value, _ in marks}))
+    _write_values(axes, sorted(rank, key=lambda value: (rank[value], value)))
     moved = found.moved
     axes.set_xlabel(VALUES.get(moved, f"{moved}, {unit}"))
     axes.set_ylabel(plain if moved in VALUES else named)
@@ -117,11 +122,11 @@ def _jumps(found: "Diagram | SceneDiagram", field: str) -> list[tuple[float, flo
 
 
 def _write_values(axes: Axes, values: list[float]) -> None:
-    """Where folds and edges are along the top, those that have room."""
+    """Where folds and edges are along the top, the first ones that have room."""
     low, high = axes.get_xlim()
     kept: list[float] = []
     for value in values:
-        if not kept or value - kept[-1] > APART * (high - low):
+        if all(abs(value - other) > APART * (high - low) for other in kept):
             kept.append(value)
     top = axes.secondary_xaxis("top")
     top.set_xticks(kept, [f"{value:.4g}" for value in kept], rotation=90, fontsize=7)

@@ -122,11 +122,16 @@ def _branch(
         point("range" if fold is None else "fold", (fold or sample).t, fold)
         for fold, sample in ((began, samples[0]), (ended, samples[-1]))
     ]
-    edges = {(edge.kind, edge.t) for mode in modes for edge in (mode.start, mode.end)}
-    inner = [point(kind, at) for kind, at in edges if kind in ("hopf", "krein", "unknown")]
-    points = [ends[0], *sorted(inner, key=lambda one: one.value), ends[1]]
+    edges = {(edge.t, edge.kind) for mode in modes for edge in (mode.start, mode.end)}
+    inner = sorted((at, kind) for at, kind in edges if kind in ("hopf", "krein", "unknown"))
+    points = [ends[0], *(point(kind, at) for at, kind in inner), ends[1]]
+    between = _between(values, kinds, points)
+    for k, (low, high) in enumerate(pairwise([t[0], *(at for at, _ in inner), t[-1]])):
+        strong = [mode for mode in modes if between[k] == "weak" and follower.is_strong(mode, low, high)]
+        if strong:
+            between[k] = "flutter" if any(mode.sigma[-1].imag for mode in strong) else "divergence"
     return Branch(
-        name=follower.name(samples[-1]),
+        name=follower.name(samples, began),
         value=values,
         gamma=speeds,
         nodes=columns["nodes"],
@@ -136,7 +141,7 @@ def _branch(
         unstable=np.array([sample.spectrum.unstable for sample in samples]),
         kind=kinds,
         points=tuple(points),
-        between=tuple(_between(values, kinds, points)),
+        between=tuple(between),
     )
 
 

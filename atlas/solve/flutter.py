@@ -90,7 +90,7 @@ def flutter_of(system: System, low: float, high: float) -> Flutter:
     counted = True
     for samples, began, ended in follower.branches(traced):
         counted &= all(sample.spectrum.status == status.OK for sample in samples)
-        windows += follower.windows(follower.modes(samples, began, ended))
+        windows += follower.windows(follower.modes(samples, began, ended), follower.name(samples, began))
     return Flutter(
         system, low, high, tuple(windows), traced.certain and counted, looked_at(low, high, traced.certain, counted)
     )

@@ -292,8 +292,8 @@ class Follower:
 
     def _zero_growth(self, still: Sample, growing: Sample, sigma: complex) -> tuple[float, complex]:
         """The same by secants that keep their bracket, and the growth rate where they end."""
-        damped = still.spectrum.roots.sigma[still.spectrum.roots.sigma.real <= 0.0]
-        ends = [(still.t, _nearest(damped, sigma)), (growing.t, sigma)]
+        others = np.concatenate([still.spectrum.roots.sigma, still.spectrum.rest])
+        ends = [(still.t, _nearest(others[others.real <= 0.0], sigma)), (growing.t, sigma)]
         heights = [ends[0][1].real, sigma.real]
         t, here, side = growing.t, sigma, 1
         for _ in range(ROUNDS):
@@ -349,8 +349,8 @@ class Follower:
         one, other = near[np.argsort(np.abs(near - centre))[:2]]
         return float((((one - other) / 2.0) ** 2).real)
 
-    def windows(self, modes: list[Mode]) -> Iterator[Window]:
-        """A window a mode; one without an edge of its own goes with that which it is inside of."""
+    def windows(self, modes: list[Mode], branch: str) -> Iterator[Window]:
+        """A window a mode of a branch; one without an edge of its own goes with that which it is inside of."""
         groups: list[list[Mode]] = []
         weak = {id(mode): max(s.real for s in mode.sigma) < WEAK for mode in modes}
         # Long ones first, strong ones before weak ones.
@@ -363,9 +363,9 @@ class Follower:
             else:
                 group.append(mode)
         for group in sorted(groups, key=lambda group: group[0].start.t):
-            yield self.window(group)
+            yield self.window(group, branch)
 
-    def window(self, modes: list[Mode]) -> Window:
+    def window(self, modes: list[Mode], branch: str) -> Window:
         """The window of the first of some modes."""
         first, last = modes[0].start, modes[0].end
         best, sample, growth = modes[0], modes[0].samples[0], 0.0
@@ -376,7 +376,7 @@ class Follower:
         sample, growth = self._summit(best, sample, growth)
         low, high = self.speed(first.t), self.speed(last.t)
         return Window(
-            branch=self.name(sample),
+            branch=branch,
             nodes=sample.nodes,
             low=low,
             high=high,
@@ -389,14 +389,17 @@ class Follower:
             weak=growth < WEAK * self.speed(sample.t),
         )
 
-    def is_strong(self, mode: Mode) -> bool:
-        """Whether it grows somewhere by so much that it is not weak, if only between samples."""
-        rates = [sigma.real for sigma in mode.sigma]
-        k = int(np.argmax(rates))
-        if not ALMOST * WEAK < rates[k] < WEAK:
-            return rates[k] >= WEAK
-        sample, growth = self._summit(mode, mode.samples[k], rates[k] * self.speed(mode.samples[k].t))
-        return growth >= WEAK * self.speed(sample.t)
+    def is_strong(self, mode: Mode, low: float = -np.inf, high: float = np.inf) -> bool:
+        """Whether it grows somewhere between two t by so much that it is not weak, if only between samples."""
+        inside = [k for k, sample in enumerate(mode.samples) if low <= sample.t <= high]
+        if not inside:
+            return False
+        k = max(inside, key=lambda k: mode.sigma[k].real)
+        rate = mode.sigma[k].real
+        if not ALMOST * WEAK < rate < WEAK:
+            return bool(rate >= WEAK)
+        sample, growth = self._summit(mode, mode.samples[k], rate * self.speed(mode.samples[k].t))
+        return low <= sample.t <= high and growth >= WEAK * self.speed(sample.t)
 
     def _summit(self, mode: Mode, sample: Sample, growth: float) -> tuple[Sample, float]:
         """The largest growth between samples, where a parabola through three of them has its vertex."""
@@ -422,13 +425,14 @@ class Follower:
         rate = _nearest(there.spectrum.growing, mode.sigma[k]).real * self.speed(there.t)
         return (there, rate) if rate > growth else (sample, growth)
 
-    def name(self, sample: Sample) -> str:
-        """As of `Equilibria`."""
+    def name(self, samples: list[Sample], began: Fold | None) -> str:
+        """As of `Equilibria`, with drag where the branch begins: after it the same number may be another's."""
+        first, last = samples[0], samples[-1]
         if not self.system.in_vacuum:
-            return f"shape {sample.place + 1}"
-        if sample.nodes == 0:
+            return f"shape {first.place + 1}" + ("" if began is None else f" from {self.value(began.t):.5g}")
+        if last.nodes == 0:
             return "outward"
-        return f"{sample.nodes} {'outer' if sample.spectrum.index % 2 else 'inner'}"
+        return f"{last.nodes} {'outer' if last.spectrum.index % 2 else 'inner'}"
 
 
 def _steps(length: float) -> int:

@@ -8,7 +8,6 @@ index says.
 """
 
 import threading
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import legendre
 
-from towatlas.effort import check_foreseen
+from towatlas.effort import TooMuchWork, check_foreseen, each_allowed
 from towatlas.solve.motion import Array, Complex, Integers, Motion
 
 # Gauss nodes a panel beyond the degree.
@@ -45,9 +44,9 @@ class Modes:
         Growth rates in units of Omega.
     energy : ndarray, shape (modes,)
         Energy of the mode in the rotating frame over that of its motion [-]: negative where friction would make an
-        oscillation grow; of meaning without drag only.
+        oscillation grow; nan with drag.
     index : int
-        Number of directions in which the energy falls.
+        Number of directions in which the energy falls; -1 with drag.
     """
 
     sigma: Complex
@@ -56,18 +55,18 @@ class Modes:
 
 
 @dataclass(frozen=True)
-class _Panel:
-    """Functions on a panel, at its Gauss nodes, and what they weigh.
+class _Panels:
+    """Functions on panels, at their Gauss nodes, and what they weigh.
 
     Attributes
     ----------
-    slope, eta : ndarray, shape (nodes, 3, functions)
+    slope, eta : ndarray, shape (panels, nodes, 3, functions)
         Slopes, and what they move the cable by, from the upper end of the panel down.
-    end : ndarray, shape (3, functions)
+    end : ndarray, shape (panels, 3, functions)
         What they move all that is below by.
-    length, tension : ndarray, shape (nodes,)
+    length, tension : ndarray, shape (panels, nodes)
         Weights in arc length, and the tension.
-    mass, friction, force, bend : ndarray, shape (nodes, 3, 3)
+    mass, friction, force, bend : ndarray, shape (panels, nodes, 3, 3)
         Weighted with the length: 1, 2 S + A, S S + A S, and E P.
     """
 
@@ -97,7 +96,10 @@ def modes(motion: Motion, refined: int = 0) -> Modes:
     """
     degree, panel = DEGREE + 3 * refined, PANEL / 1.5**refined
     unknowns = 2 * (degree + 1) * int(_panel_of_step(motion, panel)[-1] + 1)
-    check_foreseen(SECONDS_A_CUBE * unknowns**3, f"modes of {unknowns} unknowns", REMEDY)
+    seconds = SECONDS_A_CUBE * unknowns**3
+    check_foreseen(seconds, f"modes of {unknowns} unknowns", REMEDY)
+    if seconds > each_allowed():
+        raise TooMuchWork(f"modes of {unknowns} unknowns are too many for one of many shapes")
     with _one_blas_thread:
         return _modes(motion, refined, degree, panel)
 
@@ -141,13 +143,16 @@ def _modes(motion: Motion, refined: int, degree: int, panel: float) -> Modes:
     mass, friction, stiffness = matrices(motion, degree, panel)
     # With the mass as unit.
     inverse = np.linalg.inv(np.linalg.cholesky(mass))
-    friction, stiffness = inverse @ friction @ inverse.T, inverse @ stiffness @ inverse.T
-    curvature, basis = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
+    curvature, basis = np.linalg.eigh(inverse @ (0.5 * (stiffness + stiffness.T)) @ inverse.T)
     kept = max(LEAST, int(np.searchsorted(curvature, BEYOND * 2.0**refined * (motion.reach + 1.0) ** 2)))
-    basis = basis[:, :kept]
+    basis = inverse.T @ basis[:, :kept]
     friction, stiffness = basis.T @ friction @ basis, basis.T @ stiffness @ basis
     size = len(friction)
     first_order = np.block([[np.zeros((size, size)), np.eye(size)], [-stiffness, -friction]])
+    if motion.drag or motion.fish[1]:
+        sigma = np.linalg.eigvals(first_order)
+        sigma = sigma[sigma.imag >= 0.0]
+        return Modes(sigma, np.full(len(sigma), np.nan), -1)
     sigma, vectors = np.linalg.eig(first_order)
     upper = sigma.imag >= 0.0
     sigma, vectors = sigma[upper], vectors[:size, upper]
@@ -172,86 +177,95 @@ def matrices(motion: Motion, degree: int, panel: float) -> tuple[Array, Array, A
     -------
     M, G, K : ndarray, shape (unknowns, unknowns)
     """
-    panels = list(_panels(motion, degree, panel))
-    size = panels[0].end.shape[1]
-    unknowns = size * len(panels)
+    part = _panels(motion, degree, panel)
+    panels, _, size = part.end.shape
+    unknowns = panels * size
     # A bare tip is left out of the steps: so much cable.
     mass, pull = motion.fish[0] + motion.start[0] * motion.start[1], motion.fish[1] * PULL
-    # What is below a panel moves as one; the fish is the last of it. From the fish up.
-    below = [mass * np.eye(3), 2.0 * mass * S + pull, (mass * S + pull) @ S]
-    all_of = [np.zeros((unknowns, unknowns)) for _ in below]
-    ends, right, left = np.zeros((3, unknowns)), np.zeros((3, 3, unknowns)), np.zeros((3, 3, unknowns))
-    for j, part in enumerate(panels):
-        at = slice(j * size, (j + 1) * size)
-        ends[:, at] = part.end
-        for i, weight in enumerate((part.mass, part.friction, part.force)):
-            moved, back = weight @ part.eta, np.swapaxes(weight, 1, 2) @ part.eta
-            all_of[i][at, at] = _product(part.eta, moved) + part.end.T @ below[i] @ part.end
-            # With those above, which here move by their ends.
-            right[i][:, at] = moved.sum(0) + below[i] @ part.end
-            left[i][:, at] = back.sum(0) + below[i].T @ part.end
-            below[i] = below[i] + weight.sum(0)
-        bent = part.bend @ part.slope
-        stretched = (part.length * part.tension)[:, None, None] * part.slope
-        all_of[2][at, at] += _product(part.slope, stretched) - _product(part.eta, bent)
-        right[2][:, at] -= bent.sum(0)
-    number = np.repeat(np.arange(len(panels)), size)
+    fish = (mass * np.eye(3), 2.0 * mass * S + pull, (mass * S + pull) @ S)
+    ends = part.end.transpose(1, 0, 2).reshape(3, unknowns)
+    number = np.repeat(np.arange(panels), size)
     higher = number[:, None] > number
-    for i, full in enumerate(all_of):
-        full += np.where(higher, ends.T @ right[i], 0.0) + np.where(higher.T, left[i].T @ ends, 0.0)
+    found = []
+    for weight, tip in zip((part.mass, part.friction, part.force), fish, strict=True):
+        # What is below a panel moves as one; the fish is the last of it. From the fish up.
+        below = np.cumsum(np.concatenate([tip[None], weight.sum(1)]), axis=0)[:-1]
+        moved, back = weight @ part.eta, np.swapaxes(weight, 2, 3) @ part.eta
+        own = _product(part.eta, moved) + np.swapaxes(part.end, 1, 2) @ below @ part.end
+        # With those above, which here move by their ends.
+        right, left = moved.sum(1) + below @ part.end, back.sum(1) + np.swapaxes(below, 1, 2) @ part.end
+        found.append((own, right, left))
+    bent = part.bend @ part.slope
+    stretched = (part.length * part.tension)[..., None, None] * part.slope
+    own, right, left = found[2]
+    found[2] = own + _product(part.slope, stretched) - _product(part.eta, bent), right - bent.sum(1), left
+    all_of = []
+    for own, right, left in found:
+        flat = (side.transpose(1, 0, 2).reshape(3, unknowns) for side in (right, left))
+        upper, lower = (np.where(higher, ends.T @ side, 0.0) for side in flat)
+        full = upper + lower.T
+        for j in range(panels):
+            at = slice(j * size, (j + 1) * size)
+            full[at, at] = own[j]
+        all_of.append(full)
     return all_of[0], all_of[1], all_of[2]
 
 
 def _product(one: Array, other: Array) -> Array:
-    return np.tensordot(one, other, ((0, 1), (0, 1)))
+    """Sums over the nodes and axes of each panel."""
+    panels, size = len(one), one.shape[-1]
+    return np.swapaxes(one.reshape(panels, -1, size), 1, 2) @ other.reshape(panels, -1, size)
 
 
-def _panels(motion: Motion, degree: int, panel: float) -> Iterator[_Panel]:
+def _panels(motion: Motion, degree: int, panel: float) -> _Panels:
     """From the fish up."""
-    of_step = _panel_of_step(motion, panel)
     share, weights, integrals = _rule(degree + NODES)
     # From the upper end of the panel down.
     polynomials: Array = legendre.legvander(1.0 - 2.0 * share, degree)[:, None, :].astype(float)
-    for j in range(of_step[-1] + 1):
-        steps = np.flatnonzero(of_step == j)
-        k, part, whole = _places(motion, steps, share)
-        values = np.einsum("qro,qo->qr", motion.series[k], part[:, None] ** np.arange(motion.series.shape[-1]))
-        P, TA, EP = (values[:, 1 + 9 * i : 10 + 9 * i].reshape(-1, 3, 3) for i in range(3))
-        length, tension = whole * weights, values[:, 0]
-        slope = _slopes(P, polynomials)
-        drag, own = (length / tension)[:, None, None] * TA, length[:, None, None]
-        yield _Panel(
-            slope,
-            np.einsum("qj,jid->qid", whole * integrals, slope),
-            np.einsum("q,qid->id", length, slope),
-            length,
-            tension,
-            own * np.eye(3),
-            own * 2.0 * S + drag,
-            (own * S + drag) @ S,
-            own * EP,
-        )
+    k, part, whole = _places(motion, _panel_of_step(motion, panel), share)
+    values = np.einsum("pqro,pqo->pqr", motion.series[k], part[..., None] ** np.arange(motion.series.shape[-1]))
+    P, TA, EP = (values[..., 1 + 9 * i : 10 + 9 * i].reshape(*k.shape, 3, 3) for i in range(3))
+    length, tension = whole[:, None] * weights, values[..., 0]
+    slope = _slopes(P, polynomials)
+    drag, own = (length / tension)[..., None, None] * TA, length[..., None, None]
+    return _Panels(
+        slope,
+        np.einsum("pqj,pjid->pqid", whole[:, None, None] * integrals, slope, optimize=True),
+        np.einsum("pq,pqid->pid", length, slope),
+        length,
+        tension,
+        own * np.eye(3),
+        own * 2.0 * S + drag,
+        (own * S + drag) @ S,
+        own * EP,
+    )
 
 
-def _places(motion: Motion, steps: Integers, share: Array) -> tuple[Integers, Array, float]:
-    """Where shares of the length of some steps are: number and part of the step; and that length."""
+def _places(motion: Motion, panel_of: Integers, share: Array) -> tuple[Integers, Array, Array]:
+    """Where shares of the length of each panel are, by the panels of the steps: number and part of the step, shape
+    (panels, shares); and those lengths."""
     powers = np.arange(motion.series.shape[-1])
     lengths = motion.series[:, 0] / (powers + 1) * motion.sizes[:, None]
-    borders = np.concatenate([[0.0], np.cumsum(lengths[steps].sum(1))])
-    target = borders[-1] * share
-    k = np.clip(np.searchsorted(borders, target, side="right") - 1, 0, len(steps) - 1)
-    target, k = target - borders[k], steps[k]
-    low, high = np.zeros(len(share)), np.ones(len(share))
-    part = np.full(len(share), 0.5)
+    borders = np.concatenate([[0.0], np.cumsum(lengths.sum(1))])
+    # Where panels begin, and the last one ends.
+    starts = np.concatenate([np.flatnonzero(np.diff(panel_of, prepend=-1)), [len(panel_of)]])
+    whole = np.diff(borders[starts])
+    target = (borders[starts[:-1], None] + whole[:, None] * share).ravel()
+    k = np.clip(np.searchsorted(borders, target, side="right") - 1, 0, len(panel_of) - 1)
+    target -= borders[k]
+    along, tension = lengths[k], motion.series[k, 0] * motion.sizes[k, None]
+    low, high = np.zeros(len(k)), np.ones(len(k))
+    part = np.full(len(k), 0.5)
     for _ in range(NEWTON):
         all_of = part[:, None] ** powers
-        miss = (lengths[k] * all_of).sum(1) * part - target
+        miss = (along * all_of).sum(1) * part - target
         low, high = np.where(miss < 0.0, part, low), np.where(miss < 0.0, high, part)
-        trial = part - miss / ((motion.series[k, 0] * all_of).sum(1) * motion.sizes[k])
+        trial = part - miss / (tension * all_of).sum(1)
         last, part = part, np.where((trial >= low) & (trial <= high), trial, 0.5 * (low + high))
         if np.abs(part - last).max() < PLACED:
             break
-    return k, part, float(borders[-1])
+    shape = len(whole), len(share)
+    return k.reshape(shape), part.reshape(shape), whole
 
 
 def _panel_of_step(motion: Motion, panel: float) -> Integers:
@@ -280,11 +294,11 @@ def _rule(nodes: int) -> tuple[Array, Array, Array]:
 
 
 def _slopes(P: Array, polynomials: Array) -> Array:
-    """Two unit vectors across the cable, times polynomials: shape (nodes, 3, functions)."""
-    first, second = np.linalg.eigh(P[len(P) // 2])[1][:, [2, 1]].T
-    n = P @ first
+    """Two unit vectors across the cable, times polynomials: shape (panels, nodes, 3, functions)."""
+    middle = np.linalg.eigh(P[:, P.shape[1] // 2])[1]
+    n = (P @ middle[:, None, :, 2:])[..., 0]
     n /= np.linalg.norm(n, axis=-1, keepdims=True)
-    b = P @ second
+    b = (P @ middle[:, None, :, 1:2])[..., 0]
     b -= n * (n * b).sum(-1, keepdims=True)
     b /= np.linalg.norm(b, axis=-1, keepdims=True)
     return np.concatenate([n[..., None] * polynomials, b[..., None] * polynomials], axis=-1)

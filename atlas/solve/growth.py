@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from towatlas.effort import check_patience
+from towatlas.effort import TooMuchWork, check_patience
 from towatlas.kernels import status
 from towatlas.solve.galerkin import Modes, modes
 from towatlas.solve.motion import Array, Complex, Motion, motions
@@ -15,8 +15,10 @@ from towatlas.system import System
 # many times the frequency of a hanging cable of this length, without which slow circles would see none of its modes.
 REACH_CONSERVED, REACH, HANGING = 1.0, 3.0, 2.0
 # Modes that damp faster than this, and than the leading one by this, are left as Galerkin's method has them, in units
-# of Omega.
-DAMPED = 0.1
+# of Omega; the second where there is no zero of D next to what is in the first.
+DAMPED = 0.02, 0.1
+# |sigma| of modes of Galerkin's method, over the reach, that D is divided by where it is counted.
+AROUND = 2.0
 # Below this, in units of Omega, growth is weak.
 WEAK = 0.01
 # Growth that rounding cannot be told from.
@@ -130,6 +132,8 @@ class Spectrum:
         A code of `towatlas.kernels.status`.
     guesses : Modes or None
         The last of Galerkin's method.
+    rest : ndarray of complex, shape (modes,)
+        In a fluid other modes of Galerkin's method: what damps faster than the roots, or is beyond the reach.
     reach : float
         As of `reach_of`.
     """
@@ -140,6 +144,7 @@ class Spectrum:
         self.roots = Roots(np.empty(0, np.complex128), np.empty(0))
         self.unstable = -1
         self.guesses: Modes | None = None
+        self.rest = np.empty(0, np.complex128)
         self.reach = reach_of(system, gamma)
         self.motion = lambda reach: motions(np.array([r_f]), np.array([gamma]), system.row()[None], reach)[0]
         check_patience("growth rates", REMEDY)
@@ -148,8 +153,14 @@ class Spectrum:
         if motion.status != status.OK:
             return
         for refined in range(REFINEMENTS):
-            check_patience("growth rates", REMEDY)
-            guesses = self.guesses = modes(motion, refined)
+            try:
+                check_patience("growth rates", REMEDY)
+                guesses = self.guesses = modes(motion, refined)
+            except TooMuchWork:
+                # What is known already is told, as not counted.
+                if not len(self.roots):
+                    raise
+                return
             if self._counted(motion, guesses):
                 self.status = status.OK
                 return
@@ -217,22 +228,24 @@ class Spectrum:
         sigma = guesses.sigma
         near = np.abs(sigma) < 1.1 * motion.reach
         if near.any():
-            damped = min(-DAMPED, sigma.real[near].max() - DAMPED)
-            roots = zeros_near(motion, guesses, near & (sigma.real > damped))
+            for width in DAMPED:
+                slow = near & (sigma.real > min(0.0, sigma.real[near].max()) - width)
+                roots = zeros_near(motion, guesses, slow)
+                if len(roots):
+                    break
+            self.rest = sigma[(np.abs(sigma) < AROUND * motion.reach) & ~slow]
         else:
-            damped = -np.inf
-            roots = self._slowest(motion, guesses)
-        rest = sigma[near & (sigma.real <= damped)]
-        if self._all_inside(motion, roots, rest):
+            roots, self.rest = self._slowest(motion, guesses), sigma[:0]
+        if self._all_inside(motion, roots):
             return True
         if motion.fastest_flow > 1.0:
             return False
         # Where drag is strong Galerkin's method is no guess of what grows slowly beside a fold.
         more = growing_real(motion, roots)
-        return len(more) > len(roots) and self._all_inside(motion, more, rest)
+        return len(more) > len(roots) and self._all_inside(motion, more)
 
-    def _all_inside(self, motion: Motion, roots: Roots, rest: Complex) -> bool:
-        """Whether there are no other zeros in the half disc than these; the rest are not in it."""
+    def _all_inside(self, motion: Motion, roots: Roots) -> bool:
+        """Whether there are no other zeros in the half disc than these."""
         if not len(roots):
             return False
         self.roots = roots
@@ -240,7 +253,7 @@ class Spectrum:
             return False
         grows = (roots.sigma.real > np.maximum(roots.error, STILL)) & (np.abs(roots.sigma) < motion.reach)
         self.unstable = int(np.where(roots.sigma[grows].imag == 0.0, 1, 2).sum())
-        count = count_growing(motion, np.concatenate([roots.sigma, rest]))
+        count = count_growing(motion, np.concatenate([roots.sigma, self.rest]))
         inside = roots.sigma[(roots.sigma.real > 0.0) & (np.abs(roots.sigma) < motion.reach)]
         return count == int(np.where(inside.imag == 0.0, 1, 2).sum())
 

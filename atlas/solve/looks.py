@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from towatlas.effort import check_patience, limited
+from towatlas.effort import check_patience, count_steps, limited
 from towatlas.kernels import status
 from towatlas.solve.jets import jets_of
 from towatlas.solve.shots import LEAST_BATCH, REMEDY, Array, Ends, Integers, shoot, upright
@@ -113,6 +113,7 @@ def look_stiffly(r: Array, gamma: Array, systems: Array) -> Looks:
     for begin in range(0, rows, batch):
         check_patience("shots with drag", REMEDY)
         shoot_stiff_threads(marched, systems, TOLERANCE, STIFF_STEPS, begin, min(rows, begin + batch))
+    count_steps(DEARER * float(steps.sum()))
     states[port, 1] *= -1.0
     x, y = states[:, 0], states[:, 1]
     rho2 = x.real**2 + y.real**2

@@ -117,7 +117,11 @@ def _stretch(branch: Branch, k: int, kind: str, low: float, high: float) -> Stre
     if not len(inside):
         inside = np.array([int(np.argmin(np.abs(branch.value - 0.5 * (low + high))))])
     # One next to an edge may be of the neighbour's kind.
-    rates = np.where(branch.kind[inside] == kind, branch.growth[inside], np.nan)
+    same = branch.kind[inside] == kind
+    if kind == "flutter" and not same.any():
+        # It is that between samples of weak growth only.
+        same = branch.kind[inside] == "weak"
+    rates = np.where(same, branch.growth[inside], np.nan)
     growth, frequency = np.nan, np.nan
     if not np.isnan(rates).all():
         most = int(np.nanargmax(rates))

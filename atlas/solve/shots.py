@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from towatlas.effort import check_patience, limited, scaled
+from towatlas.effort import check_patience, count_steps, limited, scaled
 from towatlas.kernels.system import C_S, COLUMNS, W_F, W
 from towatlas.solve.jets import Jets
 
@@ -127,6 +127,7 @@ def shoot(
         if limited():
             batch = int(np.clip(STEPS_A_BATCH / max(1.0, steps[begin:stop].mean()), LEAST_BATCH, BATCH))
         begin = stop
+    count_steps(float(steps.sum()))
     x, y = state[:, 0, 0], state[:, 1, 0]
     # Where no drag takes the cable out of its plane the angle grows by half a turn at every crossing of the axis.
     angle = np.where(y == 0.0, np.pi * turns[:, 1], np.arctan2(y, x) + 2.0 * np.pi * turns[:, 0])

@@ -22,6 +22,8 @@ FAR, OF_THE_WAY = 0.1, 0.4
 CLOSE, CIRCLE = 0.02, 32
 # Of the zeros of a series on that circle, those within this part of it are right.
 INSIDE = 0.6
+# Zeros on a circle with larger errors are looked for by secants from there; double ones have smaller ones.
+VAGUE = 1e-6
 # First difference of secants, over sigma; errors over 1 + |sigma| that are left, with the rough Evans function and the
 # full one.
 FIRST_STEP, ROUGH, FINE = 1e-4, 1e-5, 32.0 * EPS
@@ -210,8 +212,8 @@ def together(motion: Motion, centre: complex, radius: float, rough: bool = False
     turn = np.exp(2j * np.pi * np.arange(CIRCLE) / CIRCLE)
     values, logs = motion.evans(centre + radius * turn, rough)
     series = np.fft.fft(values * np.exp(logs - logs.max())) / CIRCLE
-    # The highest first; the upper half of the coefficients is rounding.
-    series = series[CIRCLE // 2 :: -1]
+    # The highest first; the upper half of the coefficients is left out: rounding, or on a large circle not.
+    out, series = np.abs(series[CIRCLE // 2 + 1 :]), series[CIRCLE // 2 :: -1]
     if complex(centre).imag == 0.0:
         # Real coefficients, so that what is real is so to the last bit.
         series.imag = 0.0
@@ -219,6 +221,7 @@ def together(motion: Motion, centre: complex, radius: float, rough: bool = False
     sigma = sigma[np.abs(sigma) < INSIDE]
     slopes, curves = (np.abs(np.polyval(np.polyder(series, order), sigma)) for order in (1, 2))
     noise = (ROUGH if rough else NOISE * EPS * np.sqrt(len(motion.sizes))) * np.abs(series).max()
+    noise = noise + np.abs(sigma)[:, None] ** np.arange(CIRCLE // 2 + 1, CIRCLE) @ out
     # Of a double zero the square of the distance is known.
     error = radius * np.minimum(noise / np.maximum(slopes, 1e-300), np.sqrt(2.0 * noise / np.maximum(curves, 1e-300)))
     return Roots(centre + radius * sigma, error)
@@ -245,8 +248,18 @@ def zeros_near(motion: Motion, found: Modes, wanted: NDArray[np.bool_]) -> Roots
     roots, good = polish(motion, guesses[alone], mirrored)
     parts = [Roots(roots.sigma[good], roots.error[good])]
     again = [np.array([k]) for k in alone[~good]] + [group for group in groups if len(group) > 1]
-    parts += [_around(motion, guesses[group]) for group in again]
+    parts += [_sharpened(motion, _around(motion, guesses[group])) for group in again]
     return _distinct(np.concatenate([p.sigma for p in parts]), np.concatenate([p.error for p in parts]))
+
+
+def _sharpened(motion: Motion, some: Roots) -> Roots:
+    """Zeros from a circle; those that its series tells badly by secants, or left out."""
+    vague = some.error > VAGUE
+    roots, found = polish(motion, some.sigma[vague], np.concatenate([some.sigma, some.sigma.conj()]))
+    return Roots(
+        np.concatenate([some.sigma[~vague], roots.sigma[found]]),
+        np.concatenate([some.error[~vague], roots.error[found]]),
+    )
 
 
 def growing_real(motion: Motion, known: Roots) -> Roots:

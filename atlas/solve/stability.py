@@ -11,7 +11,7 @@ from towatlas.results import Equilibria
 from towatlas.results_motion import Stability
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.growth import REMEDY, Spectrum, has_drag, reach_of
-from towatlas.solve.motion import Motion, motions
+from towatlas.solve.motion import TOGETHER, Motion, motions
 from towatlas.system import System
 
 
@@ -107,11 +107,16 @@ def stability_of(found: Equilibria) -> Stability:
     late: TooMuchWork | None = None
     with patience():
         reach = reach_of(system, found.gamma)
-        moved = motions(found.r_f, np.full(count, found.gamma), np.tile(system.row(), (count, 1)), reach)
-        # The one that is expected to be seen first, in case the patience ends.
-        for done, k in enumerate(sorted(range(count), key=lambda k: abs(k - found.expected))):
+        # In case the patience ends: the one that is expected to be seen, then those of few nodes, which are quick.
+        order = sorted(range(count), key=lambda k: (k != found.expected, found.nodes[k]))
+        moved: dict[int, Motion] = {}
+        for done, k in enumerate(order):
             try:
                 check_patience("growth rates of the shapes", REMEDY, done=done, of=count)
+                if k not in moved:
+                    some = order[done : done + TOGETHER]
+                    speeds, systems = np.full(len(some), found.gamma), np.tile(system.row(), (len(some), 1))
+                    moved = dict(zip(some, motions(found.r_f[some], speeds, systems, reach), strict=True))
                 answer = spectrum_of(found, k, moved[k])
             except TooMuchWork as reason:
                 codes[k], late = status.UNFINISHED, late or reason
@@ -125,8 +130,12 @@ def stability_of(found: Equilibria) -> Stability:
                 sigmas[k] = roots.sigma * speed
                 growth[k], frequency[k] = sigmas[k][0].real, sigmas[k][0].imag
                 error[k] = max(roots.error[0], found.error[k]) * speed
-    if late is not None and (codes == status.UNFINISHED).all():
+    left = int((codes == status.UNFINISHED).sum())
+    if late is not None and left == count:
         raise late
+    scope = looked_at(found) + (
+        f"; of {left} of {count} shapes none was looked for, as the patience ended" * (left > 0)
+    )
     return Stability(
         found,
         growth,
@@ -137,7 +146,7 @@ def stability_of(found: Equilibria) -> Stability:
         error,
         codes,
         tuple(sigmas),
-        looked_at(found),
+        scope,
     )
 
 

@@ -177,7 +177,8 @@ def stretch(cable: tuple[float, float]) -> Stretch:
         samples.append(follower.sample(column.t, float(column.x[0]), 0))
     if any(sample.spectrum.status != status.OK for sample in samples):
         raise ArithmeticError(f"lambda = {lam:g}, w_f = {w_f:g}: not all that grows was counted")
-    windows = tuple(sorted(follower.windows(follower.modes(samples, None, None)), key=lambda window: window.low))
+    found = follower.windows(follower.modes(samples, None, None), follower.name(samples, None))
+    windows = tuple(sorted(found, key=lambda window: window.low))
     speeds = [follower.speed(sample.t) for sample in samples]
     growth = [max(0.0, 2.0 * pi * float(sample.spectrum.roots.sigma[0].real)) for sample in samples]
     edges = [edge for w in windows for edge in (w.low, w.high) if not any(o.low < edge < o.high for o in windows)]
