@@ -15,7 +15,8 @@ from towatlas.system import System
 # many times the frequency of a hanging cable of this length, without which slow circles would see none of its modes.
 REACH_CONSERVED, REACH, HANGING = 1.0, 3.0, 2.0
 # Modes that damp faster than this, and than the leading one by this, are left as Galerkin's method has them, in units
-# of Omega; the second where there is no zero of D next to what is in the first.
+# of Omega; the second where Galerkin's method is far off: where there is no zero of D next to what is in the first, or
+# the flow outruns waves.
 DAMPED = 0.02, 0.1
 # |sigma| of modes of Galerkin's method, over the reach, that D is divided by where it is counted.
 AROUND = 2.0
@@ -228,7 +229,7 @@ class Spectrum:
         sigma = guesses.sigma
         near = np.abs(sigma) < 1.1 * motion.reach
         if near.any():
-            for width in DAMPED:
+            for width in DAMPED if motion.fastest_flow <= 1.0 else DAMPED[1:]:
                 slow = near & (sigma.real > min(0.0, sigma.real[near].max()) - width)
                 roots = zeros_near(motion, guesses, slow)
                 if len(roots):
