@@ -6,6 +6,7 @@ import pytest
 import towatlas
 from towatlas.limits import unchecked_threshold_length
 from towatlas.solve.krein import SPEED, Collisions, Domain, begins
+from towatlas.tables.stability import cell_of
 
 
 @pytest.fixture(scope="module")
@@ -114,3 +115,13 @@ def test_bad_numbers():
     for w_f, n, words in ((-1.0, 1, "w_f"), (1.0, 0, "whole number")):
         with pytest.raises(ValueError, match=words):
             towatlas.krein_boundaries(w_f, n)
+
+
+def test_where_newton_goes_astray():
+    """No warning, which `build --stability` printed, and no point."""
+    collisions = Collisions(np.array([1]), np.array([1.0]), Domain())
+    for far in (800.0, -800.0):
+        values, _, _, sound = collisions(np.full((1, 4), far), np.array([0]))
+        assert values.shape == (1, 3)
+        assert not sound.any()
+    assert cell_of(np.array([np.nan, -1.0, 1.0]), 5).tolist() == [0, 0, 3]

@@ -87,6 +87,8 @@ class Collisions:
         slope = np.stack([np.zeros(len(z)), terms[:, 1] / RADIUS, 2.0 * terms[:, 2] / RADIUS], axis=1)
         return np.stack([miss, terms[:, 0], terms[:, 1]], axis=1), slope, ends.log_rho[:, 1], sound
 
+    # Newton's method may go far astray: what overflows there is not sound.
+    @np.errstate(over="ignore", divide="ignore", invalid="ignore")
     def __call__(self, z: Array, rows: Integers) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
         """As `towatlas.numerics.curves.Equations`."""
         aside = DIFFERENCE * np.eye(UNKNOWNS)[:S]
@@ -100,6 +102,7 @@ class Collisions:
         sound = np.asarray(sound.reshape(len(z), -1).all(axis=1) & np.isfinite(values).all(axis=(1, 2)))
         return values[:, 0], np.swapaxes(jacobian, 1, 2), self.limits(z, rows, slope[:, 0]), sound
 
+    @np.errstate(over="ignore", invalid="ignore")
     def limits(self, z: Array, rows: Integers, slope: Array) -> Array:
         """What is positive within the domain: of length, at both ends, speed, fold, and s."""
         low, high = np.log(self.domain.excess)

@@ -151,6 +151,7 @@ def cell_of(coordinate: Array, nodes: int) -> Integers:
     Parameters
     ----------
     coordinate : ndarray, shape (points,)
+        What is nan is taken for the first cell.
     nodes : int
         >= 2.
 
@@ -158,7 +159,8 @@ def cell_of(coordinate: Array, nodes: int) -> Integers:
     -------
     ndarray of int, shape (points,)
     """
-    return np.clip((0.5 * (coordinate + 1.0) * (nodes - 1)).astype(np.int64), 0, nodes - 2)
+    at = np.nan_to_num(0.5 * (coordinate + 1.0) * (nodes - 1))
+    return np.clip(at, 0, nodes - 2).astype(np.int64)
 
 
 class GrowthGrid:
