@@ -221,8 +221,8 @@ class StabilityGrid:
     n_max: int = 3
     axes: StabilityAxes = field(default_factory=lambda: StabilityAxes(1e-2, 1e2, 1e4, 1.005, 3.0))
     w_f: int = 16
-    excess: int = 13
-    speed: int = 25
+    excess: int = 19
+    speed: int = 33
     curves_every: int = 3
     checks: int = 100
 
