@@ -450,7 +450,8 @@ class FlutterSpeeds(Answer):
     error : ndarray, shape (boundaries,)
         Estimated relative error of gamma [-].
     status : int
-        A code of `towatlas.kernels.status`; NOT_COUNTED where there may be others, as next to where a window opens.
+        A code of `towatlas.kernels.status`; NOT_COUNTED where there may be others or, of two nearer
+        to each other than their errors, none, as next to where a window opens.
     """
 
     DIMENSION: ClassVar[str] = "edge"

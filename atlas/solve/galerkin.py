@@ -8,6 +8,8 @@ index says.
 """
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -100,36 +102,23 @@ def modes(motion: Motion, refined: int = 0) -> Modes:
     check_foreseen(seconds, f"modes of {unknowns} unknowns", REMEDY)
     if seconds > each_allowed():
         raise TooMuchWork(f"modes of {unknowns} unknowns are too many for one of many shapes")
-    with _one_blas_thread:
+    with _one_blas_thread():
         return _modes(motion, refined, degree, panel)
 
 
-class _OneBlasThread:
-    """BLAS on one thread while anybody is within. Matrices this small are no work for two: on busy cores its threads
-    would wait for each other, thirty times as long as one takes alone.
+@contextmanager
+def _one_blas_thread() -> Iterator[None]:
+    """BLAS on one thread within, where one thread of Python is at a time.
 
-    The limit is of the process, and to move it while another thread is in BLAS is not safe: the first who comes sets
-    it, and the last who leaves takes it back.
+    Matrices this small are no work for two: on busy cores threads of BLAS would wait for each other, thirty times as
+    long as one takes alone, and with their number the last bits change. The limit is of the process, not to be moved
+    while another thread relies on it; threadpoolctl from 3.8 on ignores whoever asks for one meanwhile.
     """
-
-    def __init__(self) -> None:
-        self._lock, self._within = threading.Lock(), 0
-        self._limit: Any = None
-
-    def __enter__(self) -> None:
-        with self._lock:
-            if self._within == 0:
-                self._limit = _blas().limit(limits=1, user_api="blas")
-            self._within += 1
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._within -= 1
-            if self._within == 0:
-                self._limit.restore_original_limits()
+    with _within, _blas().limit(limits=1, user_api="blas"):
+        yield
 
 
-_one_blas_thread = _OneBlasThread()
+_within = threading.RLock()
 
 
 @cache

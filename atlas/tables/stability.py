@@ -498,11 +498,14 @@ class StabilityTable:
         order = np.argsort(ratio)
         order = order[ratio[order] <= fastest]
         gamma = fold * np.exp(ratio[order])
+        error = error[held][order] + errors[n - 1, 0]
+        # Two that are nearer to each other than that may be none.
+        whole &= bool((np.diff(gamma) > error[1:] * gamma[1:] + error[:-1] * gamma[:-1]).all())
         return {
             "gamma": gamma,
             "begins": self.arrays["sheet_begins"][mine][held][order] == 1,
             "frequency": sheet_at(frequency[held], y, x)[order] * gamma,
-            "error": error[held][order] + errors[n - 1, 0],
+            "error": error,
             "status": status.OK if whole else status.NOT_COUNTED,
         }
 
