@@ -229,11 +229,13 @@ class Spectrum:
         sigma = guesses.sigma
         near = np.abs(sigma) < 1.1 * motion.reach
         if near.any():
-            for width in DAMPED if motion.fastest_flow <= 1.0 else DAMPED[1:]:
-                slow = near & (sigma.real > min(0.0, sigma.real[near].max()) - width)
+            leading = min(0.0, float(sigma.real[near].max()))
+            narrow, wide = DAMPED
+            slow = near & (sigma.real > leading - (narrow if motion.fastest_flow <= 1.0 else wide))
+            roots = zeros_near(motion, guesses, slow)
+            if not len(roots):
+                slow = near & (sigma.real > leading - wide)
                 roots = zeros_near(motion, guesses, slow)
-                if len(roots):
-                    break
             self.rest = sigma[(np.abs(sigma) < AROUND * motion.reach) & ~slow]
         else:
             roots, self.rest = self._slowest(motion, guesses), sigma[:0]
