@@ -192,6 +192,21 @@ def test_the_expected_shape_alone(small, tmp_path):
         plot_map(towatlas.open_map(small))
 
 
+def test_what_a_killed_worker_leaves_is_taken_away(tmp_path, monkeypatch):
+    """Though the program itself goes on to the end."""
+    from towatlas.maps import build
+
+    def killed_at_the_end(folder, *rest, **more):
+        run_tiles(folder, *rest, **more)
+        tile_path(folder, 0).with_name("00000000.tile.host.0.part").write_bytes(b"half")
+
+    run_tiles = build.run_tiles
+    monkeypatch.setattr(build, "run_tiles", killed_at_the_end)
+    build.build_map(make_spec(PLAIN | {"axes": {"lam": [2.0, 3.0]}}), tmp_path / "map")
+    assert tile_path(tmp_path / "map", 0).exists()
+    assert not list(tmp_path.rglob("*.part"))
+
+
 def test_a_system_that_fails_spoils_no_other(monkeypatch):
     """One that raises is told from the rest of its tile."""
     spec = make_spec(PLAIN | {"axes": {"lam": [2.0, 3.0, 4.0, 5.0, 6.0]}})

@@ -209,6 +209,8 @@ def build_map(
             for dim in ("shape", "fold")
         }
         digests = [known[number].digest for number in range(count)]
+        # Of workers killed on the way.
+        _remove_orphans(folder)
         write_store(folder, spec, widths, digests, progress)
     if netcdf is not None:
         merge(folder, spec, netcdf)
