@@ -186,6 +186,14 @@ def test_a_part_of_the_speeds(known):
     assert len(known.folds(point, gamma * 0.999, 5.0)) == 1
 
 
+def test_points_of_the_map_are_told(known):
+    """Their own folds were half way between the speeds looked at, where the first column then was."""
+    for C in known.dataset.C.values:
+        for lam in known.dataset.lam.values:
+            for off in (0.0, 1e-15, -1e-15):
+                assert len(known.folds(system(float(C) * (1.0 + off), float(lam)), *SPAN)) > 0
+
+
 def test_the_same_bytes_when_it_goes_on(folder, tmp_path):
     again = tmp_path / "again"
     copytree(folder, again)

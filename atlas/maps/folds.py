@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 HELD = ("folds", "folds_status", "fold_gamma", "fold_n")
 # How far beyond the speeds of the folds of the points around, in the logarithm.
 MARGIN = 0.6
+# Above not the same: half way between, where a trace looks first, would be the fold itself, two shapes in one.
+MARGIN_ABOVE = 0.67
 # A number of a system is that of the map, or an end of its axis, within the rounding of a ratio.
 ROUNDED = 1e-12
 
@@ -66,7 +68,7 @@ def folds_around(data: xr.Dataset, cells: dict[str, Cell], system: System, low: 
     top = np.log(high / low)
     # Where there are none, in the middle, so that something is looked at.
     t = np.log(around["fold_gamma"][np.isfinite(around["fold_gamma"])] / low) if around["folds"].any() else 0.5 * top
-    first, last = max(0.0, float(np.min(t)) - MARGIN), min(top, float(np.max(t)) + MARGIN)
+    first, last = max(0.0, float(np.min(t)) - MARGIN), min(top, float(np.max(t)) + MARGIN_ABOVE)
     found = solve_folds_between(system, low * np.exp(first), ("gamma",), np.exp(last - first), named=False)
     ends = search(*Path(system.row(), low, ("gamma",)).at(np.array([0.0, top])))
     if not found.complete or (ends.status != status.OK).any():
