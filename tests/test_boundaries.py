@@ -125,3 +125,12 @@ def test_where_newton_goes_astray():
         assert values.shape == (1, 3)
         assert not sound.any()
     assert cell_of(np.array([np.nan, -1.0, 1.0]), 5).tolist() == [0, 0, 3]
+
+
+@pytest.mark.slow
+def test_a_turn_next_to_a_cusp_stays_on_its_curve():
+    """Secants on the direction of the curve went astray: one point at lambda_c3 + 0.277, gamma 0."""
+    for curve in towatlas.krein_boundaries(1e4, 3):
+        assert (curve.gamma > 0.1).all()
+        assert curve.error.max() < 1e-6
+        assert np.abs(np.diff(np.log(curve.gamma))).max(initial=0.0) < 0.5

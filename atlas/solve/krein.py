@@ -233,7 +233,11 @@ def _whole(equations: Collisions, ahead: Curve, back: Curve) -> tuple[Boundary, 
     while k < len(points) - 1:
         before, after = points[k, EXCESS] - points[k - 1, EXCESS], points[k + 1, EXCESS] - points[k, EXCESS]
         if before * after < 0.0:
-            points[k] = _turning(equations, points[k])
+            turned = _turning(equations, points[k])
+            # Next to a cusp the curve turns about, and secants on its direction may go astray: there the point stays.
+            room = max(np.linalg.norm(points[k + side] - points[k]) for side in (-1, 1))
+            if np.linalg.norm(turned - points[k]) <= room:
+                points[k] = turned
             turns.append(k)
         k += 1
     rows = np.zeros(len(points), np.int64)
