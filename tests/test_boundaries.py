@@ -128,9 +128,10 @@ def test_where_newton_goes_astray():
 
 
 @pytest.mark.slow
-def test_a_turn_next_to_a_cusp_stays_on_its_curve():
-    """Secants on the direction of the curve went astray: one point at lambda_c3 + 0.277, gamma 0."""
-    for curve in towatlas.krein_boundaries(1e4, 3):
+@pytest.mark.parametrize(("w_f", "n"), [(1e4, 3), (2.1082391344554146, 2)])
+def test_a_turn_next_to_a_cusp_stays_on_its_curve(w_f, n):
+    """Secants on the direction of the curve went astray: a point at lambda_c3 + 0.277, gamma 0."""
+    for curve in towatlas.krein_boundaries(w_f, n):
         assert (curve.gamma > 0.1).all()
         assert curve.error.max() < 1e-6
         assert np.abs(np.diff(np.log(curve.gamma))).max(initial=0.0) < 0.5
