@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 ATLAS := build/atlas.nc
 
 .DEFAULT_GOAL := help
-.PHONY: help install atlas dist seeds equilibria drag stability test docs bench failures types check figures clean
+.PHONY: help install atlas dist seeds bitcode equilibria drag stability test docs bench failures types check figures clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
@@ -31,6 +31,9 @@ dist: atlas  ## build/dist: a wheel with the atlas in it, and the sources with i
 
 seeds: atlas  ## shorten the series of build/atlas.nc into atlas/solve/fold_series.npz, which direct solutions start from
 	$(BIN)/python -m towatlas.builders.fold_series $(ATLAS)
+
+bitcode: install  ## compile the kernels as far as is the same for every processor, into kernels/bitcode.zip
+	$(BIN)/python -m towatlas.kernels.packing
 
 equilibria: install  ## build build/equilibria.nc, the table of fish positions
 	$(BIN)/python -m towatlas build --equilibria

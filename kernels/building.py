@@ -1,32 +1,43 @@
 """The compiler: kernels as object files. Runs in a process of its own, so that what it asks of numba is nobody else's.
 
+What numba's front end makes of the kernels, four fifths of the work and the same on every processor of a kind, comes
+with the package (`kernels.packing`); LLVM makes machine code of it for this one. Where it is of other sources, another
+kind of processor, or a newer LLVM, numba does all of it.
+
 An object file holds a kernel, all that it calls, a door and the memory of its arrays. The door takes one argument, the
 packed values that numba would pass the kernel in registers; `kernels.native` packs them.
 """
 
 import importlib
 import json
+import lzma
 import os
 import sys
+import zipfile
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import binding as llvm
 from llvmlite import ir
 
 from towatlas.kernels import calls
-from towatlas.kernels.native import DTYPES, Kernel
+from towatlas.kernels.native import DTYPES, SOURCE_FOLDER, Kernel, ready_llvm, source_hash
 
 BYTE, WORD, INT, DOUBLE = ir.IntType(8), ir.IntType(64), ir.IntType(32), ir.DoubleType()
 POINTER, WORDS = BYTE.as_pointer(), WORD.as_pointer()
 # The head of an array in numba: references, destructor, its argument, data, size, allocator.
 HEAD = 6
+# What `kernels.packing` writes.
+PACKED = SOURCE_FOLDER / "bitcode.zip"
+ABOUT = "about.json"
+# With an older LLVM numba puts its passes together in another way, and does all of it.
+OWN_PASSES = llvm.llvm_version_info >= (20,)
 
 
 def main() -> None:
     """Compile what the first argument of the process names: sizes and object files, one after the other, on stdout."""
     features, names = json.loads(sys.argv[1])
     os.environ["NUMBA_CPU_FEATURES"] = features
-    _optimise_once()
     with os.fdopen(os.dup(1), "wb") as out:
         os.dup2(2, 1)  # whatever else is printed
         for module, name in names:
@@ -35,42 +46,107 @@ def main() -> None:
             out.write(len(code).to_bytes(8, "little") + code)
 
 
-def _optimise_once() -> None:
-    """Have LLVM optimise a kernel together with all it calls, and not each of these before, level by level."""
-    from numba.core.codegen import CPUCodeLibrary
-
-    # Private to numba, and only a matter of time: left alone where there is no such method.
-    optimise: Any = getattr(CPUCodeLibrary, "_optimize_final_module", None)
-    if optimise is not None:
-        whole = {kernel.name for kernel in calls.KERNELS}
-
-        def once(library: Any) -> None:
-            if library.name in whole:
-                optimise(library)
-
-        setattr(CPUCodeLibrary, "_optimize_final_module", once)  # noqa: B010
-
-
 def object_code(kernel: Kernel, features: str) -> bytes:
     """The object file of a kernel."""
-    import numba
-
-    function: Any = getattr(importlib.import_module(f"towatlas.kernels.{kernel.module}"), kernel.name)
-    kinds = tuple(_kind(argument) for argument in kernel.arguments)
-    signature = tuple(kind for group in kinds for kind in (group if isinstance(group, list) else [group]))
-    function.compile(numba.void(*signature))
-    name = function.overloads[signature].fndesc.llvm_func_name
-    module = llvm.parse_assembly(function.inspect_llvm(signature))
+    ready_llvm()
+    machine = llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=features, opt=3, reloc="static", codemodel="jitdefault", jit=True
+    )
+    name, module = (packed(kernel) if OWN_PASSES else None) or _compiled(kernel)
+    if OWN_PASSES:
+        _optimise(module, machine)
     own = ir.Module()
     own.triple, own.data_layout = module.triple, str(module.data_layout)
     _memory(own)
     _door(own, name, kernel)
     module.link_in(llvm.parse_assembly(str(own)))
     module.verify()
-    machine = llvm.Target.from_triple(module.triple).create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=features, opt=3, reloc="static", codemodel="jitdefault", jit=True
-    )
     return machine.emit_object(module)
+
+
+def packed(kernel: Kernel) -> tuple[str, Any] | None:
+    """Name and module of a kernel as they come with the package; None where that is of no use here."""
+    try:
+        with zipfile.ZipFile(PACKED) as file:
+            about = json.loads(file.read(ABOUT))
+            here = about["sources"] == source_hash() and about["triple"] == llvm.get_process_triple()
+            if not here or about["llvm"] > llvm.llvm_version_info[0]:
+                return None
+            name = f"{kernel.module}.{kernel.name}"
+            return about["symbols"][name], llvm.parse_bitcode(file.read(name))
+    except (OSError, EOFError, KeyError, ValueError, RuntimeError, zipfile.BadZipFile, lzma.LZMAError):
+        return None
+
+
+def _optimise(module: Any, machine: Any) -> None:
+    """What numba has LLVM do with a module when all of it is there."""
+
+    def passes() -> tuple[Any, Any]:
+        tuning = llvm.create_pipeline_tuning_options(speed_level=3)
+        tuning.loop_vectorization, tuning.slp_vectorization = True, False
+        builder = llvm.create_pass_builder(machine, tuning)
+        return builder.getModulePassManager(), builder
+
+    first, builder = passes()
+    first.add_loop_rotate_pass()
+    first.add_instruction_combine_pass()
+    first.add_jump_threading_pass()
+    first.add_refprune_pass(llvm.RefPruneSubpasses.ALL)
+    first.run(module, builder)
+    second, builder = passes()
+    second.add_refprune_pass(llvm.RefPruneSubpasses.ALL)
+    second.run(module, builder)
+
+
+def _compiled(kernel: Kernel) -> tuple[str, Any]:
+    """Name and module of a kernel by numba."""
+    if OWN_PASSES and (found := front_end(kernel)):
+        name, code = found
+        return name, llvm.parse_bitcode(code)
+    name, text = _by_numba(kernel)
+    return name, llvm.parse_assembly(text())
+
+
+# What numba hands to LLVM, by name of the function; one may be there for arguments of several kinds.
+_modules: dict[str, list[bytes]] = {}
+
+
+def front_end(kernel: Kernel) -> tuple[str, bytes] | None:
+    """Name and bitcode of a kernel and all that it calls, of which LLVM has made nothing yet; None if not to be had."""
+    from numba.core.codegen import CPUCodeLibrary
+
+    # Private to numba. In its place nothing is done: `_optimise` has LLVM do it, once, and not for each helper before.
+    def kept(library: Any) -> None:
+        _modules.setdefault(library.name, []).append(library._final_module.as_bitcode())
+
+    its_own: Any = getattr(CPUCodeLibrary, "_optimize_final_module", None)
+    if its_own is None:
+        return None
+    setattr(CPUCodeLibrary, "_optimize_final_module", kept)  # noqa: B010
+    try:
+        name, _ = _by_numba(kernel)
+    finally:
+        setattr(CPUCodeLibrary, "_optimize_final_module", its_own)  # noqa: B010
+    found = [code for code in _modules.get(kernel.name, []) if _defines(code, name)]
+    return (name, found[0]) if found else None
+
+
+def _defines(code: bytes, symbol: str) -> bool:
+    try:
+        return not llvm.parse_bitcode(code).get_function(symbol).is_declaration
+    except NameError:
+        return False
+
+
+def _by_numba(kernel: Kernel) -> tuple[str, Callable[[], str]]:
+    """Name of a kernel that numba has compiled, and what gives its optimised module as text."""
+    import numba
+
+    function: Any = getattr(importlib.import_module(f"towatlas.kernels.{kernel.module}"), kernel.name)
+    kinds = tuple(_kind(argument) for argument in kernel.arguments)
+    signature = tuple(kind for group in kinds for kind in (group if isinstance(group, list) else [group]))
+    function.compile(numba.void(*signature))
+    return function.overloads[signature].fndesc.llvm_func_name, lambda: function.inspect_llvm(signature)
 
 
 def _kind(argument: Any) -> Any:

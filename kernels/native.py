@@ -2,9 +2,9 @@
 
 numba takes 0.7 s of every process before the first kernel has run, most of it for its own tables. What it makes of a
 kernel is an object file, though, which llvmlite loads in a millisecond. So kernels are compiled in a process of their
-own (`kernels.building`), once, and kept. The folder they are kept in carries a hash of all kernel sources, the version
-of numba and the processor, so that any change of these starts an empty one; each file begins with the SHA-256 of the
-rest, and one that does not fit is thrown away.
+own (`kernels.building`), mostly without numba, once, and kept. The folder they are kept in carries a hash of all
+kernel sources, the version of numba and the processor, so that any change of these starts an empty one; each file
+begins with the SHA-256 of the rest, and one that does not fit is thrown away.
 """
 
 import ctypes
@@ -239,12 +239,18 @@ class _Code:
         slots.extend(value.strides)
 
 
-def _engine() -> Any:
+def ready_llvm() -> Any:
+    """llvmlite's LLVM, ready to make code for this processor."""
     llvm = _llvm()
     if llvm.llvm_version_info < (20,):
         llvm.initialize()
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
+    return llvm
+
+
+def _engine() -> Any:
+    llvm = ready_llvm()
     machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
     return llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
 

@@ -1,16 +1,19 @@
 """The compiler beside the process that asks: what it makes is kept, and never stale."""
 
 import hashlib
+import json
 import os
+import platform
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from towatlas.kernels import calls, native
+from towatlas.kernels import building, calls, native
 
 # An answer of a small kernel, how often it was compiled, and which of what should stay out is there.
 SHOT = """
@@ -69,6 +72,40 @@ def test_cache_serves_no_old_kernel(tmp_path):
     third = probe(folder, cache)
     assert third[1] == 1
     assert third[0] != first[0]
+
+
+def test_the_package_brings_what_numba_makes_of_these_sources():
+    with zipfile.ZipFile(building.PACKED) as file:
+        about = json.loads(file.read(building.ABOUT))
+    assert about["sources"] == native.source_hash(), "the kernels have changed: run make bitcode"
+    assert set(about["symbols"]) == {f"{kernel.module}.{kernel.name}" for kernel in calls.KERNELS}
+
+
+@pytest.mark.skipif(not building.OWN_PASSES, reason="an older LLVM")
+@pytest.mark.skipif(platform.machine() != "x86_64" or sys.platform != "linux", reason="for another processor")
+def test_the_compiler_does_without_numba(tmp_path):
+    """Its front end is four fifths of the work, and the same on every processor of a kind."""
+    code = (
+        "import sys; sys.modules['numba'] = None; from towatlas.kernels import building, calls, native"
+        "; print([len(building.object_code(kernel, native.features())) > 5000 for kernel in calls.KERNELS])"
+    )
+    assert run(code, tmp_path)[0].split("[")[1].count("True") == len(calls.KERNELS)
+
+
+@pytest.mark.parametrize("spoil", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:100_000])])
+def test_without_what_the_package_brings_numba_does_it(tmp_path, spoil):
+    """To the same bits."""
+    code = SHOT.rstrip() + "; x = np.linspace(0.5, 2.0, 9); out = [np.empty(9) for _ in range(3)]"
+    code += "; forward_shots(x, x, x, -x, 20, *out, 0, 9); print([[v.hex() for v in row.tolist()] for row in out])"
+    whole, bare = tmp_path / "whole", tmp_path / "bare"
+    copied(whole)
+    spoil(copied(bare) / "bitcode.zip")
+    found = [
+        run(f"import sys; sys.path.insert(0, {str(folder)!r})" + code, tmp_path / f"cache{k}")[0]
+        for k, folder in enumerate((whole, bare))
+    ]
+    assert found[0] == found[1]
+    assert found[0].split()[1:3] == ["1", "False"]
 
 
 def test_the_process_that_asks_does_without_numba(tmp_path):

@@ -154,7 +154,7 @@ def test_the_description_links_nowhere_but_to_sites(wheel):
 @pytest.mark.network
 def test_the_wheel_holds_what_the_repository_does(wheel):
     """Every module, the scenes, the types of cable, the tables of sources, the parts of the page, and the atlas."""
-    kinds = ("*.py", "*.toml", "*.csv", "*.npz", "scenes/*.toml", "*.html", "*.css", "*.js", "*.txt")
+    kinds = ("*.py", "*.toml", "*.csv", "*.npz", "scenes/*.toml", "*.html", "*.css", "*.js", "*.txt", "*.zip")
     inside = set(zipfile.ZipFile(wheel).namelist())
     expected = {SHIPPED.replace("atlas", "towatlas", 1)}
     for package in SETUPTOOLS["packages"]:
