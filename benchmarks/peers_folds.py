@@ -1,6 +1,8 @@
 """Critical speeds as a SciPy user would solve for them: shots with root, or the extended problem with solve_bvp."""
 
 import warnings
+from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
@@ -22,9 +24,14 @@ class OutOfPatienceError(Exception):
     """A shot, or a search, took too long."""
 
 
+@cache
+def _opened_guess() -> Callable:
+    return opened(_first_guess)
+
+
 def guess(n: int, w_f: float, lam: float) -> tuple[float, float]:
     """The closed-form guess that the direct solver of this project starts from: (log a, log gamma)."""
-    return opened(_first_guess)(lam, w_f, float(excess_length(lam, w_f, n)), n)
+    return _opened_guess()(lam, w_f, float(excess_length(lam, w_f, n)), n)
 
 
 def _slopes(xi: Array, y: Array, parameters: Array, w_f: float, lam: float) -> Array:

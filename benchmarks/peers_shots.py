@@ -22,9 +22,14 @@ def missing() -> list[str]:
     return [name for name, module in PEERS.items() if importlib.util.find_spec(module) is None]
 
 
+@cache
+def _begin() -> Callable:
+    return opened(start)
+
+
 def starts(a: Array, mu: Array, tau: Array) -> Array:
     """Rows t, f, p, v, q that shots start from."""
-    begin = opened(start)
+    begin = _begin()
     found = np.array([begin(*row) for row in zip(a, mu, tau, strict=True)])
     return np.stack([mu + found[:, 0], found[:, 1], found[:, 2], found[:, 4], found[:, 5]])
 

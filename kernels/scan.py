@@ -9,10 +9,10 @@ import numpy as np
 
 from towatlas.kernels import status
 from towatlas.kernels.compiling import helper, inlined, kernel
-from towatlas.kernels.steppers import rk4_forward
+from towatlas.kernels.steppers import DS, FISH, FORCE, FORWARD_WORK, GAMMA2, X, rk4_forward
+from towatlas.kernels.steppers import FORWARD_LANES as LANES
 from towatlas.kernels.vacuum import boundary_error
 
-LANES = 32
 ZOOM_GUESSES = 32  # shots across the window in which an extremum of E is looked for
 ZOOMS = 5  # each narrows the window by about 15
 SECANTS = 60
@@ -26,30 +26,23 @@ def forward_shots(lam, w_f, gamma, r_x0, segments, errors, x_end, r_x_end, begin
 
     errors[i] : E(lambda) of Eq. (33). x_end[i], r_x_end[i] : x and R_x at the fish.
     """
-    x = np.empty(LANES)
-    force = np.empty(LANES)
-    gamma2 = np.empty(LANES)
-    fish = np.empty(LANES)
-    ds = np.empty(LANES)
+    work = np.empty(FORWARD_WORK)
     for block in range(begin, stop, LANES):
         for lane in range(LANES):
             i = min(block + lane, stop - 1)
-            x[lane] = 1.0
-            force[lane] = r_x0[i]
-            gamma2[lane] = gamma[i] * gamma[i]
-            fish[lane] = w_f[i]
-            ds[lane] = lam[i] / segments
+            work[X + lane] = 1.0
+            work[FORCE + lane] = r_x0[i]
+            work[GAMMA2 + lane] = gamma[i] * gamma[i]
+            work[DS + lane] = lam[i] / segments
+            work[FISH + lane] = w_f[i]
         for segment in range(segments):
-            left = float(segments - segment)
-            for lane in range(LANES):
-                x[lane], force[lane] = rk4_forward(
-                    x[lane], force[lane], fish[lane] + left * ds[lane], gamma2[lane], ds[lane]
-                )
+            rk4_forward(work, float(segments - segment))
         for lane in range(min(LANES, stop - block)):
             i = block + lane
-            errors[i] = boundary_error(x[lane], force[lane], fish[lane], gamma2[lane])
-            x_end[i] = x[lane]
-            r_x_end[i] = force[lane]
+            x, force = work[X + lane], work[FORCE + lane]
+            errors[i] = boundary_error(x, force, work[FISH + lane], work[GAMMA2 + lane])
+            x_end[i] = x
+            r_x_end[i] = force
 
 
 @inlined
@@ -63,19 +56,18 @@ def solution_curve(lam, w_f, gamma, low, high, segments, errors):
     """E / gamma^2 at len(errors) values of u = R_x0 / gamma^2 spaced evenly from low to high, both included."""
     guesses = len(errors)
     gamma2 = gamma * gamma
-    ds = lam / segments
-    x = np.empty(LANES)
-    force = np.empty(LANES)
+    work = np.empty(FORWARD_WORK)
+    work[FISH : FISH + LANES] = w_f
+    work[GAMMA2 : GAMMA2 + LANES] = gamma2
+    work[DS : DS + LANES] = lam / segments
     for block in range(0, guesses, LANES):
         for lane in range(LANES):
-            x[lane] = 1.0
-            force[lane] = gamma2 * (low + (high - low) * min(block + lane, guesses - 1) / (guesses - 1))
+            work[X + lane] = 1.0
+            work[FORCE + lane] = gamma2 * (low + (high - low) * min(block + lane, guesses - 1) / (guesses - 1))
         for segment in range(segments):
-            below = w_f + float(segments - segment) * ds
-            for lane in range(LANES):
-                x[lane], force[lane] = rk4_forward(x[lane], force[lane], below, gamma2, ds)
+            rk4_forward(work, float(segments - segment))
         for lane in range(min(LANES, guesses - block)):
-            errors[block + lane] = boundary_error(x[lane], force[lane], w_f, gamma2) / gamma2
+            errors[block + lane] = boundary_error(work[X + lane], work[FORCE + lane], w_f, gamma2) / gamma2
 
 
 @inlined

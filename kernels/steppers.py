@@ -17,21 +17,53 @@ from towatlas.kernels.calls import ORDER, TRUNCATION
 from towatlas.kernels.compiling import inlined
 from towatlas.kernels.vacuum import forward_slopes, inverse_root_guess
 
+# So many forward shots at once, and where in their work array each quantity of them is: weight of the fish, gamma^2
+# and the length of a step; the others change.
+FORWARD_LANES = 32
+X, FORCE, FISH, GAMMA2, DS, DX, DFORCE, SUM_DX, SUM_DFORCE = (FORWARD_LANES * place for place in range(9))
+FORWARD_WORK = FORWARD_LANES * 9
+
 
 @inlined
-def rk4_forward(x, force, below, gamma2, ds):
-    """One classical Runge-Kutta step of Eqs. (29a, b) of NRL Report 7048, down the cable by ds."""
-    middle = below - 0.5 * ds
-    x1, f1 = forward_slopes(x, force, below, gamma2)
-    x2, f2 = forward_slopes(x + 0.5 * ds * x1, force + 0.5 * ds * f1, middle, gamma2)
-    x3, f3 = forward_slopes(x + 0.5 * ds * x2, force + 0.5 * ds * f2, middle, gamma2)
-    x4, f4 = forward_slopes(x + ds * x3, force + ds * f3, below - ds, gamma2)
-    # Times, not over: the division unit would be what these shots wait for.
-    sixth = ds * (1.0 / 6.0)
-    return (
-        x + sixth * (x1 + 2.0 * (x2 + x3) + x4),
-        force + sixth * (f1 + 2.0 * (f2 + f3) + f4),
-    )
+def _forward_slopes(work, lane, left, part):
+    """Slopes of x and R_x of a lane, `part` of its step down the cable by the slopes of before."""
+    h = part * work[DS + lane]
+    x, force = work[X + lane] + h * work[DX + lane], work[FORCE + lane] + h * work[DFORCE + lane]
+    return forward_slopes(x, force, work[FISH + lane] + left * work[DS + lane] - h, work[GAMMA2 + lane])
+
+
+@inlined
+def _inner_slopes(work, left):
+    """Those in the middle of the step, and their share of the sums."""
+    for lane in range(FORWARD_LANES):
+        dx, dforce = _forward_slopes(work, lane, left, 0.5)
+        work[DX + lane] = dx
+        work[DFORCE + lane] = dforce
+        work[SUM_DX + lane] += 2.0 * dx
+        work[SUM_DFORCE + lane] += 2.0 * dforce
+
+
+@inlined
+def rk4_forward(work, left):
+    """One classical Runge-Kutta step of Eqs. (29a, b) (NRL Report 7048), all lanes; `left` of them lead to the fish.
+
+    One slope of all lanes after the other: a slope waits for the one before it, and meanwhile there are other lanes.
+    """
+    for lane in range(FORWARD_LANES):
+        below = work[FISH + lane] + left * work[DS + lane]
+        dx, dforce = forward_slopes(work[X + lane], work[FORCE + lane], below, work[GAMMA2 + lane])
+        work[DX + lane] = dx
+        work[DFORCE + lane] = dforce
+        work[SUM_DX + lane] = dx
+        work[SUM_DFORCE + lane] = dforce
+    _inner_slopes(work, left)
+    _inner_slopes(work, left)
+    for lane in range(FORWARD_LANES):
+        dx, dforce = _forward_slopes(work, lane, left, 1.0)
+        # Times, not over: the division unit would be what these shots wait for.
+        sixth = work[DS + lane] * (1.0 / 6.0)
+        work[X + lane] += sixth * (work[SUM_DX + lane] + dx)
+        work[FORCE + lane] += sixth * (work[SUM_DFORCE + lane] + dforce)
 
 
 @inlined

@@ -9,7 +9,9 @@ import numpy as np
 
 from towatlas.builders.grids import Grid, ScanSettings
 from towatlas.cli import main
+from towatlas.kernels import steppers
 from towatlas.kernels.calls import END_COLUMNS, FOLD_COLUMNS, forward_shots, march
+from towatlas.kernels.compiling import opened
 from towatlas.kernels.sweeps import march_parallel
 from towatlas.limits import threshold_length
 
@@ -50,6 +52,22 @@ def boundary_error(w_f, lam, gamma, r_x0, segments=100) -> np.ndarray:
     errors, x, force = (np.empty(len(w_f)) for _ in range(3))
     forward_shots(lam, w_f, gamma, r_x0, segments, errors, x, force, 0, len(w_f))
     return errors
+
+
+def forward_step():
+    """Compiled: x and R_x a Runge-Kutta step of `ds` further down, from where the weight below is `below`."""
+    step = opened(steppers.rk4_forward)
+
+    def further(x, force, below, gamma2, ds):
+        work = np.zeros(steppers.FORWARD_WORK)
+        given = {"X": x, "FORCE": force, "FISH": below - ds, "GAMMA2": gamma2, "DS": ds}
+        for name, value in given.items():
+            place = getattr(steppers, name)
+            work[place : place + steppers.FORWARD_LANES] = value
+        step(work, 1.0)
+        return work[steppers.X], work[steppers.FORCE]
+
+    return further
 
 
 def random_cables(rows, seed, n_max=6, excess=(1e-3, 1e3), w_f_max=1e4):

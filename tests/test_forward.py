@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from helpers import boundary_error, root_near
+from helpers import boundary_error, forward_step, root_near
 from hypothesis import given
 from hypothesis import strategies as st
 
 from towatlas.kernels import vacuum
 from towatlas.kernels.calls import forward_shots
 from towatlas.kernels.compiling import opened
-from towatlas.kernels.steppers import rk4_forward
 from towatlas.kernels.sweeps import forward_shots_parallel
 
 # NRL Report 7048, Eqs. after (36): the median roots of the system of Fig. 16, all digits as printed there, and the
@@ -87,7 +86,7 @@ def test_shots_are_those_of_long_double():
 
 def test_mirror():
     """(x, R_x) -> (-x, -R_x) is a symmetry: E is odd, shown by the difference of two shots about x = 1 to -1."""
-    step = opened(rk4_forward)
+    step = forward_step()
     right, left = (1.0, 3.0), (-1.0, -3.0)
     for k in range(50):
         right = step(*right, 7.0 - 0.1 * k, 1.7, 0.1)

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 import reference
 import xarray as xr
-from helpers import run
+from helpers import forward_step, run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import towatlas
-from towatlas.kernels.compiling import opened
-from towatlas.kernels.steppers import rk4_forward
 from towatlas.plot.shape import plot_shape
 from towatlas.tables.seal import read_sealed
 
@@ -52,7 +50,7 @@ def test_against_34_digits(lam, w_f, gamma, root):
 def test_forward_shot_follows_the_shape():
     """Skop's forward shot from R_x0 passes through every point; its error falls with the fourth power of the step."""
     lam, w_f, gamma = 12.0, 5.0, 1.1
-    misses, step = [], opened(rk4_forward)
+    misses, step = [], forward_step()
     for segments in (200, 800):
         curve = towatlas.shape(lam, w_f, gamma, s=np.linspace(0, lam, segments + 1))
         x, force, path = 1.0, float(curve.R_x[0]), [1.0]
