@@ -140,9 +140,14 @@ def takes_frames(function: F) -> F:
     @wraps(function)
     def either(*given: Any, **named: Any) -> Any:
         pandas = sys.modules.get("pandas")
-        at = next((k for k, value in enumerate(given[:2]) if pandas and isinstance(value, pandas.DataFrame)), None)
+        if pandas is None:
+            return function(*given, **named)
+        at = next((k for k, value in enumerate(given[:2]) if isinstance(value, pandas.DataFrame)), None)
         if at is None:
-            if not any(pandas and isinstance(value, pandas.Series) for value in (*given, *named.values())):
+            for value in (*given, *named.values()):
+                if isinstance(value, pandas.Series):
+                    break
+            else:
                 return function(*given, **named)
             index, values = without_index(known.bind(*given, **named).arguments)
             return frame_of(function(**values), index)

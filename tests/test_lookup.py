@@ -46,7 +46,7 @@ def test_cells_are_the_series_of_the_atlas(atlas_file):
             series = atlas_file.critical.series(name, n)
             table, work = Cells(series), Work(len(x))
             parts = [slice(begin, begin + BLOCK) for begin in range(0, len(x), BLOCK)]
-            found = np.concatenate([table.sums(Places(x[part], y[part]), work) for part in parts])
+            found = np.concatenate([table.sums(0, Places(x[part], y[part]), work) for part in parts])
             # Of fields to 10, whose sum rounds at 1e-14; a hundredth of the errors that the file states.
             assert np.abs(found - chebval2d(y, x, series)).max() < 2e-13, (name, n)
 

@@ -30,39 +30,43 @@ Integers = NDArray[np.int64]
 
 
 class Cells:
-    """The polynomials of one series, made a row of cells at a time when first asked for.
+    """The polynomials of a few series, made a row of cells at a time when first asked for.
 
     Safe to share between threads: two at once make the same.
 
     Parameters
     ----------
-    series : ndarray, shape (y degree, x degree)
+    *series : ndarray, shape (y degree, x degree)
         Of Chebyshev polynomials on [-1, 1].
     """
 
-    def __init__(self, series: Array):
+    def __init__(self, *series: Array):
         self._series = series
-        self._terms: Array = np.empty((CELLS, CELLS, len(_POWERS_X)))
-        self._made = [False] * CELLS
+        self._terms: Array = np.empty((len(series), CELLS, CELLS, len(_POWERS_X)))
+        self._made = [[False] * CELLS for _ in series]
+        self._all_made = [False] * CELLS
 
-    def __getstate__(self) -> Array:
+    def __getstate__(self) -> tuple[Array, ...]:
         return self._series
 
-    def __setstate__(self, series: Array) -> None:
-        self.__init__(series)  # type: ignore[misc]
+    def __setstate__(self, series: tuple[Array, ...]) -> None:
+        self.__init__(*series)  # type: ignore[misc]
 
-    def _make(self, row: int) -> None:
+    def _make(self, which: int, row: int) -> None:
         # Small products, one a cell: a larger one wakes the threads of BLAS, whose waiting costs more than the work.
-        along_y, along_x = _restrictions(self._series.shape[0])[row], _restrictions(self._series.shape[1])
-        short = (along_y @ self._series) @ along_x.swapaxes(1, 2)
-        self._terms[row] = (short.reshape(CELLS, 1, -1) @ _to_powers())[:, 0]
-        self._made[row] = True
+        series = self._series[which]
+        along_y, along_x = _restrictions(series.shape[0])[row], _restrictions(series.shape[1])
+        short = (along_y @ series) @ along_x.swapaxes(1, 2)
+        self._terms[which, row] = (short.reshape(CELLS, 1, -1) @ _to_powers())[:, 0]
+        self._made[which][row] = True
 
-    def sums(self, places: "Places", work: "Work") -> Array:
-        """Values at points.
+    def sums(self, which: int, places: "Places", work: "Work") -> Array:
+        """Values of one series at points.
 
         Parameters
         ----------
+        which : int
+            From 0, in the order given.
         places : Places
             At most BLOCK of them.
         work : Work
@@ -71,11 +75,11 @@ class Cells:
         -------
         ndarray, shape (points,)
         """
-        if not all(self._made):
+        if not all(self._made[which]):
             for row in np.flatnonzero(np.bincount(places.row)).tolist():
-                if not self._made[row]:
-                    self._make(row)
-        table, count = self._terms.reshape(CELLS**2, -1), len(places.cell)
+                if not self._made[which][row]:
+                    self._make(which, row)
+        table, count = self._terms[which].reshape(CELLS**2, -1), len(places.cell)
         terms, products = work.terms[:, :count], work.products[:, :count]
         for begin in range(0, count, GATHERED):
             end = min(begin + GATHERED, count)
@@ -93,8 +97,25 @@ class Cells:
             total += following
         return total
 
-    def value(self, place: "Place") -> float:
-        """Value at one point.
+    def value(self, which: int, place: "Place") -> float:
+        """Value of one series at one point.
+
+        Parameters
+        ----------
+        which : int
+            From 0, in the order given.
+        place : Place
+
+        Returns
+        -------
+        float
+        """
+        if not self._made[which][place.row]:
+            self._make(which, place.row)
+        return float(self._terms[which, place.row, place.column].dot(place.powers))
+
+    def values(self, place: "Place") -> list[float]:
+        """Values of all series at one point.
 
         Parameters
         ----------
@@ -102,11 +123,15 @@ class Cells:
 
         Returns
         -------
-        float
+        list of float
         """
-        if not self._made[place.row]:
-            self._make(place.row)
-        return float(self._terms[place.row, place.column].dot(place.powers))
+        row = place.row
+        if not self._all_made[row]:
+            for which, made in enumerate(self._made):
+                if not made[row]:
+                    self._make(which, row)
+            self._all_made[row] = True
+        return self._terms[:, row, place.column].dot(place.powers).tolist()
 
 
 class Places:
@@ -161,24 +186,21 @@ class Place:
 
     def __init__(self, x: float, y: float):
         # As _cell_of, whose arcsin may differ in the last bit from that of `math`.
-        self.column = min(int((0.5 + float(np.arcsin(x)) / math.pi) * CELLS), CELLS - 1)
-        self.row = min(int((0.5 + float(np.arcsin(y)) / math.pi) * CELLS), CELLS - 1)
-        x = (x - _MIDDLE_LIST[self.column]) / _HALF_LIST[self.column]
-        y = (y - _MIDDLE_LIST[self.row]) / _HALF_LIST[self.row]
-        self.powers: Array = _powers(x).take(_POWERS_X)
-        self.powers *= _powers(y).take(_POWERS_Y)
+        self.column = column = min(int((0.5 + float(np.arcsin(x)) / math.pi) * CELLS), CELLS - 1)
+        self.row = row = min(int((0.5 + float(np.arcsin(y)) / math.pi) * CELLS), CELLS - 1)
+        x = (x - _MIDDLE_LIST[column]) / _HALF_LIST[column]
+        y = (y - _MIDDLE_LIST[row]) / _HALF_LIST[row]
+        x2, y2 = x * x, y * y
+        x3, y3, x4, y4 = x2 * x, y2 * y, x2 * x2, y2 * y2
+        of_x = np.array((1.0, x, x2, x3, x4, x4 * x, x4 * x2, x4 * x3, x4 * x4))
+        of_y = np.array((1.0, y, y2, y3, y4, y4 * y, y4 * y2, y4 * y3, y4 * y4))
+        self.powers: Array = of_x[_POWERS_X]
+        self.powers *= of_y[_POWERS_Y]
 
 
 def _cell_of(x: Array) -> Integers:
     """Which of the CELLS a coordinate lies in; on an edge either will do."""
     return np.minimum(((0.5 + np.arcsin(x) / np.pi) * CELLS).astype(np.int64), CELLS - 1)
-
-
-def _powers(x: float) -> Array:
-    """x^0 to x^DEGREE."""
-    x2 = x * x
-    x3, x4 = x2 * x, x2 * x2
-    return np.array((1.0, x, x2, x3, x4, x4 * x, x4 * x2, x4 * x3, x4 * x4))
 
 
 @cache

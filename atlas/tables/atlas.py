@@ -198,9 +198,9 @@ class Atlas:
         """
         check_outside(outside)
         if one := self._one(QUANTITIES, lam, w_f, n):
-            whole = {"n": np.int64, "status": np.int8}
-            given = {"n": n, "lam": lam, "w_f": w_f} | one
-            return CriticalStates(**{name: np.array(value, whole.get(name, float)) for name, value in given.items()})
+            found = {name: np.array(one[name]) for name in QUANTITIES if name != "status"}
+            found["status"] = np.array(one["status"], np.int8)
+            return CriticalStates(np.array(n, np.int64), np.array(lam, float), np.array(w_f, float), **found)
         lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
         table = self.critical.answer(QUANTITIES, outside, lam=lam.ravel(), w_f=w_f.ravel(), n=n.ravel())
         return CriticalStates(n=n, lam=lam, w_f=w_f, **_shaped(table, n))

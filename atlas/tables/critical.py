@@ -9,7 +9,7 @@ gamma grows as (lambda - lambda_cn)^(-1/2) at the threshold and every quantity i
 """
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -117,9 +117,12 @@ def from_field(name: str, field: Any, excess: Any, n: int) -> Any:
     -------
     float or ndarray, shape (points,)
     """
-    value = np.exp(field)
+    return _with_sign(name, np.exp(field), excess, n)
+
+
+def _with_sign(name: str, value: Any, excess: Any, n: int) -> Any:
     if name == "gamma":
-        return value / np.sqrt(excess)
+        return value / excess**0.5
     return -value if name == "R_x0" or (name == "x_f" and n % 2) else value
 
 
@@ -145,7 +148,7 @@ class CriticalTable:
         self._series = {name: np.asarray(group[f"{name}_series"][:], np.float64) for name in FIELDS}
         self._error: Array = np.asarray(group["gamma_error"][:], np.float64)
         self.n_max = len(self._error)
-        self._cells: dict[str, dict[int, Cells]] = {name: {} for name in FIELDS}
+        self._cells: dict[int, Cells] = {}
         self._log_excess = float(np.log(self.axes.excess.low)), float(np.log(self.axes.excess.high))
         self._log_w_f = float(np.log1p(self.axes.w_f.high / W_SCALE))
 
@@ -254,10 +257,10 @@ class CriticalTable:
         self, names: Collection[str], n: int, work: Work, *, lam: Array, w_f: Array, excess: Array
     ) -> dict[str, Array]:
         x, y = self.axes.excess.coordinate(excess), self.axes.w_f.coordinate(w_f)
-        places, values = Places(x, y), {}
-        for name in FIELDS:
+        places, values, cells = Places(x, y), {}, self._cells_of(n)
+        for k, name in enumerate(FIELDS):
             if name in names or (name == "R_x0" and "tension" in names):
-                values[name] = from_field(name, self._cells_of(name, n).sums(places, work), excess, n)
+                values[name] = from_field(name, cells.sums(k, places, work), excess, n)
         if "tension" in names:
             values["tension"] = np.hypot(w_f + lam, values["R_x0"])
         if "error" in names:
@@ -265,12 +268,12 @@ class CriticalTable:
             values["error"] = self._error[n - 1, *at] + ROUNDINGS * EPS * (1.0 + lam / excess)
         return {name: column for name, column in values.items() if name in names}
 
-    def one(self, names: Collection[str], *, lam: float, w_f: float, n: float) -> dict[str, float] | None:
+    def one(self, names: Sequence[str], *, lam: float, w_f: float, n: float) -> dict[str, float] | None:
         """As `answer`, of one point inside the table; in plain floats, which is twenty times faster for one.
 
         Parameters
         ----------
-        names : collection of str
+        names : sequence of str
             Some of QUANTITIES.
         lam, w_f, n : float
             Cable length, fish weight, number of the transition [-].
@@ -282,8 +285,9 @@ class CriticalTable:
         """
         if not (1.0 <= n <= self.n_max and n == int(n) and 0.0 < lam < math.inf and 0.0 <= w_f <= self.axes.w_f.high):
             return None
-        # numpy's functions where those of `math` may differ in the last bit: near the threshold it would show.
-        excess = (lam - (2.0 * n - 1.0)) - 1.0 / (w_f + float(np.hypot(1.0, w_f)))
+        # The absolute value of a complex number and numpy's functions, where those of `math` may differ in the last bit
+        # from what arrays get: near the threshold it would show.
+        excess = (lam - (2.0 * n - 1.0)) - 1.0 / (w_f + abs(complex(1.0, w_f)))
         if not excess > 0.0:
             return None
         longer = 1.0 + lam / excess
@@ -293,16 +297,21 @@ class CriticalTable:
         low, high = self._log_excess
         x = min(max((2.0 * float(np.log(excess)) - low - high) / (high - low), -1.0), 1.0)
         y = min(max(2.0 * float(np.log1p(w_f / W_SCALE)) / self._log_w_f - 1.0, -1.0), 1.0)
-        order, place, values = int(n), Place(x, y), {"status": float(status.OK)}
-        for name in FIELDS:
-            if name in names or (name == "R_x0" and "tension" in names):
-                values[name] = from_field(name, self._cells_of(name, order).value(place), excess, order)
+        order, place = int(n), Place(x, y)
+        cells = self._cells_of(order)
+        fields: dict[str, float]
+        if len(names) == 1 and names[0] in FIELDS:
+            fields = {names[0]: cells.value(FIELDS.index(names[0]), place)}
+        else:
+            fields = dict(zip(FIELDS, cells.values(place), strict=True))
+        values = {name: _with_sign(name, math.exp(field), excess, order) for name, field in fields.items()}
+        values["status"] = float(status.OK)
         if "tension" in names:
-            values["tension"] = np.hypot(w_f + lam, values["R_x0"])
+            values["tension"] = abs(complex(w_f + lam, values["R_x0"]))
         if "error" in names:
             rows, columns = self._error.shape[1:]
             row, column = min(int(0.5 * (y + 1.0) * rows), rows - 1), min(int(0.5 * (x + 1.0) * columns), columns - 1)
-            values["error"] = self._error[order - 1, row, column] + ROUNDINGS * EPS * longer
+            values["error"] = self._error.item(order - 1, row, column) + ROUNDINGS * EPS * longer
         return values
 
     def series(self, name: str, n: int) -> Array:
@@ -321,12 +330,11 @@ class CriticalTable:
         """
         return self._series[name][n - 1]
 
-    def _cells_of(self, name: str, n: int) -> Cells:
-        """The polynomials of a field, when first asked for; two threads at once make the same."""
-        made = self._cells[name]
-        if n not in made:
-            made[n] = Cells(self.series(name, n))
-        return made[n]
+    def _cells_of(self, n: int) -> Cells:
+        """The polynomials of all FIELDS, when first asked for; two threads at once make the same."""
+        if n not in self._cells:
+            self._cells[n] = Cells(*(self.series(name, n) for name in FIELDS))
+        return self._cells[n]
 
     def _complaint(self, bad: NDArray[np.bool_], *, lam: Array, w_f: Array, n: Integers) -> str:
         def too_short_or_long(i: int) -> str:
