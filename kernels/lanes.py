@@ -25,13 +25,14 @@ TAU, TAU_LOW, F, P, Z, V, Q, H = range(8)
 ROWS = 8
 # The states a lane keeps: now, before the step just made, and the two ends of an overshooting step.
 NOW, PREVIOUS, BASE, RESUME = 0, ROWS, 2 * ROWS, 3 * ROWS
-# Further rows: where the shot begins and ends, the step forced next (0: free), steps made and allowed, whether the
-# step just made wants attention, and of a landing its bracket and position, in sigma from BASE.
-MU, END, FORCED, STEPS, STEP_LIMIT, EVENT, LOW, HIGH, OFFSET = range(4 * ROWS, 4 * ROWS + 9)
-LANE_ROWS = 4 * ROWS + 9
+# Further rows: where the shot begins and ends, the step forced next (0: free), steps made and allowed, zeros of q
+# passed and those to be recorded, whether the step just made wants attention, and of a landing its bracket and
+# position, in sigma from BASE.
+MU, END, FORCED, STEPS, STEP_LIMIT, COUNT, FIRST, LAST, EVENT, LOW, HIGH, OFFSET = range(4 * ROWS, 4 * ROWS + 12)
+LANE_ROWS = 4 * ROWS + 12
 # Rows of `book`, whole numbers.
-JOB, MODE, COUNT, BASE_COUNT, LANDINGS = range(5)
-BOOK_ROWS = 5
+JOB, MODE, BASE_COUNT, LANDINGS = range(4)
+BOOK_ROWS = 4
 
 # A step below this fraction of the way from BASE is taken as a second-order correction: its third order is below
 # rounding. Of that way, not of the overshooting step, which may be longer by far than all the cable.
@@ -73,16 +74,26 @@ def _step_lanes(flat):
         flat[Q * LANES + lane] = q_new
         flat[H * LANES + lane] = h
         flat[STEPS * LANES + lane] = steps
+        crossing = (q < 0.0) != (q_new < 0.0)
+        count = flat[COUNT * LANES + lane]
         # Comparisons that are false for nan, so that a nan is an event.
         quiet = (
-            (q * q_new > 0.0)
-            & (v * v_new >= 0.0)
+            (abs(q_new) < np.inf)
+            & ~_hides_zeros(q, q_new, v, v_new)
+            & ~(crossing & (flat[FIRST * LANES + lane] <= count + 1.0) & (count + 1.0 <= flat[LAST * LANES + lane]))
             & ((flat[END * LANES + lane] - total) - low > 0.0)
             & (forced == 0.0)
             & (steps <= flat[STEP_LIMIT * LANES + lane])
             & (abs(p) < np.inf)
         )
+        flat[COUNT * LANES + lane] = count + (1.0 if quiet & crossing else 0.0)
         flat[EVENT * LANES + lane] = 0.0 if quiet else 1.0
+
+
+@inlined
+def _hides_zeros(q, q_new, v, v_new):
+    """Whether two zeros of q lie in a step: dv/dt = q, and v moved against the sign that q has at both ends."""
+    return ((q < 0.0) == (q_new < 0.0)) & (v * v_new < 0.0) & ((v_new - v) * q < 0.0)
 
 
 @inlined
@@ -150,7 +161,7 @@ def _copy(lanes, source, target, lane):
 
 
 @inlined
-def _load(lanes, book, lane, job, a, mu, tau_end, max_steps):
+def _load(lanes, book, lane, job, a, mu, tau_end, first_fold, last_fold, max_steps):
     """Put a shot into a lane; returns whether it ended already, within the tip series."""
     tau, f, p, z, v, q, ended = start(a, mu, tau_end)
     lanes[TAU, lane] = tau
@@ -167,28 +178,29 @@ def _load(lanes, book, lane, job, a, mu, tau_end, max_steps):
     lanes[FORCED, lane] = 0.0
     lanes[STEPS, lane] = 0.0
     lanes[STEP_LIMIT, lane] = max_steps
-    book[COUNT, lane] = 0
+    lanes[COUNT, lane] = 0.0
+    lanes[FIRST, lane] = first_fold
+    lanes[LAST, lane] = last_fold
     return ended
 
 
 @inlined
-def _after_march(lanes, book, lane, first_fold, last_fold):
+def _after_march(lanes, book, lane):
     """Take the free step just made, or begin to land on what it overshot."""
     q_old, q_new = lanes[PREVIOUS + Q, lane], lanes[Q, lane]
     v_old, v_new = lanes[PREVIOUS + V, lane], lanes[V, lane]
     crossing = (q_old < 0.0) != (q_new < 0.0)
     lanes[FORCED, lane] = 0.0
-    if not crossing and v_old * v_new < 0.0 and (v_new - v_old) * q_old < 0.0:
-        # dv/dt = q: v moved against the sign of q, so q had another sign in between. Two of its zeros hide in this
-        # step: make a shorter one.
+    if _hides_zeros(q_old, q_new, v_old, v_new):
+        # Make a shorter one.
         lanes[FORCED, lane] = 0.5 * lanes[H, lane]
         _copy(lanes, PREVIOUS, NOW, lane)
-    elif crossing and first_fold <= book[COUNT, lane] + 1 <= last_fold:
+    elif crossing and lanes[FIRST, lane] <= lanes[COUNT, lane] + 1.0 <= lanes[LAST, lane]:
         _begin_landing(lanes, book, lane, TO_FOLD)
     elif _remaining(lanes, NOW, lane) <= 0.0:
         _begin_landing(lanes, book, lane, TO_END)
     elif crossing:
-        book[COUNT, lane] += 1
+        lanes[COUNT, lane] += 1.0
 
 
 @helper
@@ -197,7 +209,7 @@ def _begin_landing(lanes, book, lane, mode):
     if book[MODE, lane] == MARCH:
         _copy(lanes, PREVIOUS, BASE, lane)
         _copy(lanes, NOW, RESUME, lane)
-        book[BASE_COUNT, lane] = book[COUNT, lane]
+        book[BASE_COUNT, lane] = int(lanes[COUNT, lane])
     book[MODE, lane] = mode
     _copy(lanes, BASE, NOW, lane)
     if mode == TO_FOLD:
@@ -260,16 +272,17 @@ def _correct(lanes, lane, d):
 
 
 @inlined
-def _settle_fold(lanes, book, lane, folds, i, n, last_fold):
+def _settle_fold(lanes, book, lane, folds, i):
     """Record the fold a lane stands on and march on from the far end of the step; returns whether the shot ended."""
     past_end = lanes[TAU, lane] > lanes[END, lane]
     if not past_end:
+        n = int(lanes[COUNT, lane] - lanes[FIRST, lane]) + 1
         folds[i, n, 0] = lanes[TAU, lane]
         folds[i, n, 1] = lanes[F, lane]
         folds[i, n, 2] = lanes[P, lane]
         folds[i, n, 3] = lanes[Z, lane]
-        book[COUNT, lane] += 1
-        if book[COUNT, lane] == last_fold and np.isinf(lanes[END, lane]):
+        lanes[COUNT, lane] += 1.0
+        if lanes[COUNT, lane] == lanes[LAST, lane] and np.isinf(lanes[END, lane]):
             return True
     if past_end or _remaining(lanes, RESUME, lane) <= 0.0:
         _begin_landing(lanes, book, lane, TO_END)
@@ -284,28 +297,27 @@ def _settle_fold(lanes, book, lane, folds, i, n, last_fold):
 def _settle_end(lanes, book, lane):
     """Close the count of a shot that stands on its end."""
     lanes[TAU, lane] = lanes[END, lane]
-    book[COUNT, lane] = book[BASE_COUNT, lane]
+    lanes[COUNT, lane] = book[BASE_COUNT, lane]
     if (lanes[Q, lane] < 0.0) != (lanes[BASE + Q, lane] < 0.0):
-        book[COUNT, lane] += 1
+        lanes[COUNT, lane] += 1.0
 
 
 @inlined
-def _advance(lanes, book, lane, first_fold, last_fold, folds, i):
+def _advance(lanes, book, lane, folds, i):
     """What follows the step a lane just made; returns whether its shot ended, and with what status."""
     if not (np.isfinite(lanes[P, lane]) and np.isfinite(lanes[Q, lane]) and np.isfinite(lanes[TAU, lane])):
         return True, status.BAD_INPUT
     if lanes[STEPS, lane] > lanes[STEP_LIMIT, lane]:
         return True, status.STEP_LIMIT
     if book[MODE, lane] == MARCH:
-        _after_march(lanes, book, lane, first_fold, last_fold)
+        _after_march(lanes, book, lane)
         return False, status.OK
     landed, d = _after_landing_step(lanes, book, lane)
     if not landed:
         return book[LANDINGS, lane] >= LANDING_LIMIT, status.NOT_CONVERGED
     _correct(lanes, lane, d)
     if book[MODE, lane] == TO_FOLD:
-        n = book[COUNT, lane] + 1 - first_fold
-        return _settle_fold(lanes, book, lane, folds, i, n, last_fold), status.OK
+        return _settle_fold(lanes, book, lane, folds, i), status.OK
     _settle_end(lanes, book, lane)
     return True, status.OK
 
@@ -316,7 +328,7 @@ def _unload(lanes, book, lane, outcome, ends, counts, statuses):
     ends[job, 0] = lanes[TAU, lane] + lanes[TAU_LOW, lane]
     for column in range(1, END_COLUMNS):
         ends[job, column] = lanes[column + 1, lane]
-    counts[job] = book[COUNT, lane]
+    counts[job] = int(lanes[COUNT, lane])
     statuses[job] = outcome
     book[MODE, lane] = IDLE
 
@@ -324,6 +336,27 @@ def _unload(lanes, book, lane, outcome, ends, counts, statuses):
 @helper
 def _sane(a, mu, tau_end):
     return a != 0.0 and np.isfinite(a) and np.isfinite(mu) and mu >= 0.0 and tau_end >= 0.0
+
+
+@helper
+def _long_first(mu, tau_end, last_fold, begin, stop):
+    """Numbers of the shots, those of more than twice the mean number of half waves before the others.
+
+    A long one that begins late marches on alone, in one lane of all.
+    """
+    waves, total = np.empty(stop - begin), 0.0
+    for k in range(stop - begin):
+        i = begin + k
+        found = sqrt(mu[i] + tau_end[i]) - sqrt(mu[i]) if tau_end[i] < np.inf else float(last_fold[i])
+        waves[k] = found if found < np.inf else 0.0
+        total += waves[k]
+    order, place = np.empty(stop - begin, np.int64), 0
+    for long in (True, False):
+        for k in range(stop - begin):
+            if (waves[k] * (stop - begin) > 2.0 * total) == long:
+                order[place] = begin + k
+                place += 1
+    return order
 
 
 @kernel
@@ -342,18 +375,19 @@ def march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts,
     lanes[STEPS, :] = 0.0
     flat = lanes.reshape(LANE_ROWS * LANES)
     book = np.zeros((BOOK_ROWS, LANES), np.int64)
-    next_job = begin
+    order = _long_first(mu, tau_end, last_fold, begin, stop)
+    next_job = 0
     busy = 0
     while True:
         for lane in range(LANES):
-            while book[MODE, lane] == IDLE and next_job < stop:
-                i = next_job
+            while book[MODE, lane] == IDLE and next_job < len(order):
+                i = order[next_job]
                 next_job += 1
                 if not _sane(a[i], mu[i], tau_end[i]):
                     ends[i, :] = np.nan
                     counts[i] = 0
                     statuses[i] = status.BAD_INPUT
-                elif _load(lanes, book, lane, i, a[i], mu[i], tau_end[i], max_steps):
+                elif _load(lanes, book, lane, i, a[i], mu[i], tau_end[i], first_fold[i], last_fold[i], max_steps):
                     sound = np.isfinite(lanes[P, lane]) and np.isfinite(lanes[Q, lane])
                     _unload(lanes, book, lane, status.OK if sound else status.BAD_INPUT, ends, counts, statuses)
                 else:
@@ -364,7 +398,7 @@ def march(a, mu, tau_end, first_fold, last_fold, max_steps, ends, folds, counts,
         for lane in range(LANES):
             if lanes[EVENT, lane] != 0.0 and book[MODE, lane] != IDLE:
                 i = book[JOB, lane]
-                ended, outcome = _advance(lanes, book, lane, first_fold[i], last_fold[i], folds, i)
+                ended, outcome = _advance(lanes, book, lane, folds, i)
                 if ended:
                     _unload(lanes, book, lane, outcome, ends, counts, statuses)
                     busy -= 1

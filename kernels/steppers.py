@@ -22,6 +22,8 @@ from towatlas.kernels.vacuum import forward_slopes, inverse_root_guess
 FORWARD_LANES = 32
 X, FORCE, FISH, GAMMA2, DS, DX, DFORCE, SUM_DX, SUM_DFORCE = (FORWARD_LANES * place for place in range(9))
 FORWARD_WORK = FORWARD_LANES * 9
+# Sums of products in the Taylor step: from this order on in two chains, but for the last so many.
+SPLIT_FROM, NEWEST = 5, 4
 
 
 @inlined
@@ -78,9 +80,13 @@ def _exp2(y):
 
 
 def _convolution(a: str, b: str, k: int) -> str:
-    # Oldest coefficients first: the sum is a chain of dependent additions, and the newest coefficient, ready last,
-    # must not hold up the rest of it.
-    return " + ".join(f"{a}{j} * {b}{k - j}" for j in sorted(range(k + 1), key=lambda j: max(j, k - j)))
+    # Oldest coefficients first: the sum is a chain of dependent additions, and the newest, ready last, must not hold up
+    # the rest of it. Long ones are two chains, which the newest follow.
+    terms = [f"{a}{j} * {b}{k - j}" for j in sorted(range(k + 1), key=lambda j: max(j, k - j))]
+    if k < SPLIT_FROM:
+        return " + ".join(terms)
+    old, new = terms[:-NEWEST], terms[-NEWEST:]
+    return " + ".join([f"({' + '.join(old[::2])})", f"({' + '.join(old[1::2])})", *new])
 
 
 def _half_square(a: str, k: int) -> str:
