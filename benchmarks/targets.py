@@ -52,11 +52,11 @@ def of_shots(rows: list[Row]) -> list[Target]:
     by_name = {(row.method, row.setting): row for row in rows}
     found = []
     for method, setting, wanted in (
-        ("heyoka in t, batch of 8", "tol 2.2e-16", 2.5),
+        ("heyoka in t, batch of 8", "tol 2.2e-16", 4.3),
         ("heyoka in t, scalar", "tol 2.2e-16", 9.0),
         ("heyoka in sigma, scalar, event", "tol 2.2e-16", 9.0),
         ("heyoka in sigma, scalar", "tol 2.2e-16", None),
-        ("heyoka in sigma, batch of 8", "tol 2.2e-16", None),
+        ("heyoka in sigma, batch of 8", "tol 2.2e-16", 2.4),
         ("SciPy DOP853", "rtol 1e-13", 3000.0),
     ):
         if row := by_name.get((method, setting)):
@@ -85,7 +85,7 @@ def of_forward_shots(rows: int = 4096, segments: int = 100) -> list[Target]:
         numba.set_num_threads(threads)
     each = f"{ours / rows / segments / 4 * 1e9:.2f} ns a right-hand side"
     return [
-        Target("forward RK4 over one vector root and division a right-hand side", bound / ours, 0.9, each),
+        Target("forward RK4 over one vector root and division a right-hand side", bound / ours, 2.0, each),
         Target("forward RK4 over a scalar prange loop, one thread each", scalar / ours, 15.0),
     ]
 
@@ -125,7 +125,7 @@ def of_threads(rows: int = 20_000) -> list[Target]:
 def of_tables(rows: list[Row]) -> list[Target]:
     """Ratios of the second chart: a table of random cables, seeds included, over solve_bvp from cold."""
     ours = rows[0]
-    found = []
+    found = [Target("6 us over a fold of a table", 6.0 / ours.microseconds, 1.0, f"{ours.microseconds:.2f} us")]
     for row in rows:
         if row.method == "SciPy solve_bvp":
             errors = f"ours at most {ours.quantile('gamma', 1.0):.0e}; theirs {row.quantile('gamma', 1.0):.0e}"
@@ -147,6 +147,7 @@ def of_folds(points: int = 4000, peer_points: int = 12) -> list[Target]:
         np.mean([seconds(lambda n=n, w_f=w_f: towatlas.solve_critical(lam, w_f, n), 3) for n, w_f in curves]) / points
     )
     error = max(float(states.error.max()) for states in exact.values())
+    found.append(Target("1 us over a fold along a curve", 1e-6 / ours, 1.0, f"{ours * 1e6:.2f} us"))
     for tolerance in (1e-3, 1e-6, 1e-9):
         spent, worst, lost = 0.0, 0.0, 0
         for n, w_f in curves:
