@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import timeit
 from collections.abc import Callable
 from pathlib import Path
 
@@ -67,13 +68,8 @@ def measure(table: Atlas, points: int = POINTS) -> tuple[list[Row], dict[str, fl
 
 
 def single(call: Callable, calls: int = 200) -> float:
-    """Seconds of a call that takes microseconds."""
-
-    def repeated() -> None:
-        for _ in range(calls):
-            call()
-
-    return seconds(repeated, 15) / calls
+    """Seconds of a call that takes microseconds, the collector of garbage at rest."""
+    return min(timeit.repeat(call, number=calls, repeat=15)) / calls
 
 
 def of_one(table: Atlas) -> dict[str, float]:

@@ -20,6 +20,7 @@ BLOCK, GATHERED = 6000, 250
 # Powers of the two coordinates of a cell, term by term, in the order of Horner's rule.
 _POWERS_Y = np.array([DEGREE - size for size in range(DEGREE + 1) for _ in range(size + 1)])
 _POWERS_X = np.array([power for size in range(DEGREE + 1) for power in range(size, -1, -1)])
+_POWERS_Y_AFTER_X = DEGREE + 1 + _POWERS_Y
 
 _EDGES = nodes(CELLS + 1)
 _MIDDLES, _HALVES = 0.5 * (_EDGES[1:] + _EDGES[:-1]), 0.5 * np.diff(_EDGES)
@@ -192,10 +193,30 @@ class Place:
         y = (y - _MIDDLE_LIST[row]) / _HALF_LIST[row]
         x2, y2 = x * x, y * y
         x3, y3, x4, y4 = x2 * x, y2 * y, x2 * x2, y2 * y2
-        of_x = np.array((1.0, x, x2, x3, x4, x4 * x, x4 * x2, x4 * x3, x4 * x4))
-        of_y = np.array((1.0, y, y2, y3, y4, y4 * y, y4 * y2, y4 * y3, y4 * y4))
-        self.powers: Array = of_x[_POWERS_X]
-        self.powers *= of_y[_POWERS_Y]
+        powers = np.array(
+            (
+                1.0,
+                x,
+                x2,
+                x3,
+                x4,
+                x4 * x,
+                x4 * x2,
+                x4 * x3,
+                x4 * x4,
+                1.0,
+                y,
+                y2,
+                y3,
+                y4,
+                y4 * y,
+                y4 * y2,
+                y4 * y3,
+                y4 * y4,
+            )
+        )
+        self.powers: Array = powers[_POWERS_X]
+        self.powers *= powers[_POWERS_Y_AFTER_X]
 
 
 def _cell_of(x: Array) -> Integers:
