@@ -65,8 +65,7 @@ def plot_boundaries(w_f: tuple[float, ...] = (0.0, 1.0, 10.0, 1352.0), axes: lis
         ax.set_xlabel(r"$\lambda - \lambda_{c1}$")
         ax.set_ylabel(r"$\gamma = \Omega\sqrt{R/g}$")
     handles = [
-        Line2D([], [], color=FOLD, linewidth=1.5, label="fold: the shape appears"),
-        Line2D([], [], color=EDGE, linewidth=1.3, label="flutter begins or ends"),
+        *_edges(),
         Line2D([], [], color="0.6", linewidth=0.8, linestyle=(0, (1, 2)), label="3 times the fold: no further looked"),
         Line2D([], [], color=FLUTTERS, linewidth=7, label="does not last"),
     ]
@@ -108,7 +107,15 @@ def plot_held(atlas: Atlas, axes: NDArray[Any]) -> list[Line2D]:
             if n == table.n_max:
                 ax.set_xlabel(r"$\lambda - \lambda_{cn}$")
         row[0].set_ylabel(rf"$\gamma / \gamma_{{c{n}}}$")
+    axes.flat[0].figure.legend(handles=_edges(), loc="outside lower center", ncols=2, frameon=False)
     return lines
+
+
+def _edges() -> list[Line2D]:
+    return [
+        Line2D([], [], color=FOLD, linewidth=1.5, label="fold: the shape appears"),
+        Line2D([], [], color=EDGE, linewidth=1.3, label="flutter begins or ends"),
+    ]
 
 
 def _shade(ax: Axes, curves: tuple[Boundary, ...], w_f: float, threshold: float, excess: Array, domain: Domain) -> None:
