@@ -1,6 +1,7 @@
 """`towatlas warmup`: compile everything now, so that no later answer waits for it."""
 
 import argparse
+import sys
 import time
 from typing import Any
 
@@ -25,6 +26,9 @@ def _run(options: argparse.Namespace) -> int:
     from towatlas.kernels import calls, native
 
     began = time.monotonic()
+    missing = sum(not kernel.path.exists() for kernel in calls.KERNELS)
+    if missing and not options.quiet and not sys.stderr.isatty():
+        say(f"compiling {missing} kernels, some seconds")
     with tqdm(total=len(calls.KERNELS), desc="compiling", disable=options.quiet or None, leave=False) as bar:
         native.warm(calls.GROUPS, lambda kernel: bar.update())
     if not options.quiet:
