@@ -10,7 +10,6 @@ packed values that numba would pass the kernel in registers; `kernels.native` pa
 
 import importlib
 import json
-import lzma
 import os
 import re
 import sys
@@ -36,15 +35,21 @@ OWN_PASSES = llvm.llvm_version_info >= (20,)
 
 
 def main() -> None:
-    """Compile what the first argument of the process names: sizes and object files, one after the other, on stdout."""
+    """Compile what the first argument of the process names.
+
+    On stdout: sizes and object files, one after the other, and at last the size of all of it; what was printed before
+    the process came to this, as by sitecustomize, stands before that.
+    """
     features, names = json.loads(sys.argv[1])
     os.environ["NUMBA_CPU_FEATURES"] = features
     with os.fdopen(os.dup(1), "wb") as out:
         os.dup2(2, 1)  # whatever else is printed
+        made = b""
         for module, name in names:
             kernel = next(found for found in calls.KERNELS if (found.module, found.name) == (module, name))
             code = object_code(kernel, features)
-            out.write(len(code).to_bytes(8, "little") + code)
+            made += len(code).to_bytes(8, "little") + code
+        out.write(made + len(made).to_bytes(8, "little"))
 
 
 def object_code(kernel: Kernel, features: str) -> bytes:
@@ -74,8 +79,9 @@ def packed(kernel: Kernel) -> tuple[str, Any] | None:
             if not here or about["llvm"] > llvm.llvm_version_info[0]:
                 return None
             name = f"{kernel.module}.{kernel.name}"
-            return about["symbols"][name], llvm.parse_bitcode(file.read(name))
-    except (OSError, EOFError, KeyError, ValueError, RuntimeError, zipfile.BadZipFile, lzma.LZMAError):
+            symbol, module = about["symbols"][name], llvm.parse_bitcode(file.read(name))
+            return None if module.get_function(symbol).is_declaration else (symbol, module)
+    except Exception:  # whatever it holds; there is another way
         return None
 
 

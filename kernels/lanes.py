@@ -347,8 +347,11 @@ def _long_first(mu, tau_end, last_fold, begin, stop):
     waves, total = np.empty(stop - begin), 0.0
     for k in range(stop - begin):
         i = begin + k
-        found = sqrt(mu[i] + tau_end[i]) - sqrt(mu[i]) if tau_end[i] < np.inf else float(last_fold[i])
-        waves[k] = found if found < np.inf else 0.0
+        waves[k] = 0.0
+        if mu[i] >= 0.0 and 0.0 <= tau_end[i] < np.inf:
+            waves[k] = sqrt(mu[i] + tau_end[i]) - sqrt(mu[i]) if mu[i] < np.inf else 0.0
+        elif tau_end[i] == np.inf:
+            waves[k] = float(last_fold[i])
         total += waves[k]
     order, place = np.empty(stop - begin, np.int64), 0
     for long in (True, False):

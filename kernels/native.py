@@ -66,17 +66,16 @@ def features() -> str:
 
 @cache
 def folder() -> Path | None:
-    """Where the code of these sources is kept; None where nothing can be written."""
+    """Where the code of these sources is kept; None where there is no such place. It may be one to read from only."""
     machine = f"{_llvm().get_host_cpu_name()} {features()}"
     key = f"{importlib.metadata.version('numba')}-{hashlib.sha256(machine.encode()).hexdigest()[:8]}"
     try:
         root = cache_root()
         chosen = root / f"{source_hash()[:16]}-numba-{key}"
         chosen.mkdir(parents=True, exist_ok=True)
-        if not os.access(chosen, os.W_OK):
-            return None
-        os.utime(chosen)
-        _delete_stale(root, chosen)
+        if os.access(chosen, os.W_OK):
+            os.utime(chosen)
+            _delete_stale(root, chosen)
     except (OSError, RuntimeError):
         return None
     return chosen
@@ -290,13 +289,16 @@ def build(kernels: Sequence[Kernel]) -> list[bytes]:
         With what the compiler said, where it fails.
     """
     told = json.dumps([features(), [(kernel.module, kernel.name) for kernel in kernels]])
-    # It finds the package where this process did.
+    # It finds the package where this process did, and no module of the folder it happens to be in before that.
     code = "import json, sys; sys.path[:] = json.loads(sys.argv[2]); from towatlas.kernels.building import main; main()"
-    command = [sys.executable, "-c", code, told, json.dumps(sys.path)]
+    command = [sys.executable, "-P", "-c", code, told, json.dumps([str(path) for path in sys.path])]
     done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL)
     if done.returncode != 0:
         raise notice.CompilerError(f"kernels could not be compiled:\n{done.stderr.decode(errors='replace').strip()}")
-    made, parts = done.stdout, []
+    size, made = int.from_bytes(done.stdout[-8:], "little"), done.stdout[:-8]
+    if not 0 < size <= len(made):
+        raise notice.CompilerError("kernels could not be compiled: something else wrote to where their code should be")
+    made, parts = made[-size:], []
     for kernel in kernels:
         size = int.from_bytes(made[:8], "little")
         parts.append(made[8 : 8 + size])

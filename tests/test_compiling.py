@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from towatlas.kernels import building, calls, native
+from towatlas.kernels import building, calls, native, notice
 
 # An answer of a small kernel, how often it was compiled, and which of what should stay out is there.
 SHOT = """
@@ -313,3 +313,38 @@ def test_warming_up_compiles_what_is_missing_and_says_so(tmp_path):
     assert f"{len(calls.KERNELS)} kernels are compiled" in done.stderr
     assert {path.name for path in tmp_path.rglob("*.o")} == {kernel.path.name for kernel in calls.KERNELS}
     assert before < set(tmp_path.rglob("*.o"))
+
+
+def test_what_the_folder_and_the_site_hold_is_none_of_the_compilers_business(tmp_path):
+    """A module of a standard name where the user happens to be, and a line printed before anything else."""
+    here, site = tmp_path / "here", tmp_path / "site"
+    here.mkdir()
+    site.mkdir()
+    (here / "json.py").write_text("raise SystemExit('not this one')\n")
+    (site / "sitecustomize.py").write_text("print('hello')\n")
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(site)}
+    code = f"import sys; sys.path[0] = {str(Path(native.__file__).parents[1])!r}\n" + SHOT
+    command = [sys.executable, "-c", code]
+    found = subprocess.run(command, env=environment, cwd=here, capture_output=True, text=True)
+    assert found.returncode == 0, found.stderr
+    assert found.stdout.split()[:1] == ["hello"]
+
+
+def test_compiled_code_followed_by_nothing_else_is_refused(monkeypatch):
+    done = subprocess.CompletedProcess([], 0, b"something else", b"")
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: done)
+    with pytest.raises(notice.CompilerError, match="something else wrote"):
+        native.build([calls.march])
+
+
+@pytest.mark.parametrize(
+    "about", [None, [], {"llvm": "20"}, {"symbols": None}, {"symbols": {"scan.forward_shots": "x"}}]
+)
+def test_an_unfit_table_of_what_is_packed_is_not_used(tmp_path, monkeypatch, about):
+    with zipfile.ZipFile(building.PACKED) as file:
+        told, code = json.loads(file.read(building.ABOUT)), file.read("scan.forward_shots")
+    with zipfile.ZipFile(tmp_path / "bitcode.zip", "w") as file:
+        file.writestr(building.ABOUT, json.dumps(told | about if isinstance(about, dict) else about))
+        file.writestr("scan.forward_shots", code)
+    monkeypatch.setattr(building, "PACKED", tmp_path / "bitcode.zip")
+    assert building.packed(calls.forward_shots) is None

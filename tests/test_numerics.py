@@ -59,7 +59,7 @@ def test_cells_are_numpys_chebyshev_sum():
     found = np.concatenate([table.sums(0, Places(x[part], y[part]), work) for part in parts])
     # What the degree of a cell leaves out of so rough a series.
     np.testing.assert_allclose(found, expected, atol=1e-10)
-    one = [Cells(series).value(0, Place(*at)) for at in zip(x[:200].tolist(), y[:200].tolist(), strict=True)]
+    one = [Cells(series).values(Place(*at))[0] for at in zip(x[:200].tolist(), y[:200].tolist(), strict=True)]
     np.testing.assert_allclose(one, found[:200], rtol=0, atol=1e-14 * np.abs(series).sum())
 
 

@@ -98,23 +98,6 @@ class Cells:
             total += following
         return total
 
-    def value(self, which: int, place: "Place") -> float:
-        """Value of one series at one point.
-
-        Parameters
-        ----------
-        which : int
-            From 0, in the order given.
-        place : Place
-
-        Returns
-        -------
-        float
-        """
-        if not self._made[which][place.row]:
-            self._make(which, place.row)
-        return float(self._terms[which, place.row, place.column].dot(place.powers))
-
     def values(self, place: "Place") -> list[float]:
         """Values of all series at one point.
 
