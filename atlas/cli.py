@@ -6,6 +6,7 @@ or written, is damaged, or holds something else, 6 a limit that was set is not k
 
 import argparse
 import math
+import os
 import sys
 from collections.abc import Iterable
 from contextlib import nullcontext
@@ -91,6 +92,10 @@ class _PrintCompletion(argparse.Action):
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
+    if "numpy" not in sys.modules:
+        # Matrices of a few rows are no work for two: threads of BLAS that wait for more take a tenth of the time.
+        for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+            os.environ.setdefault(name, "1")
     # Who asks for one command does not wait for the modules of the others.
     named = arguments[:1] if arguments and arguments[0] in COMMANDS else COMMANDS
     options = _parser(named).parse_args(arguments)

@@ -57,6 +57,29 @@ class CriticalStates(Answer):
     error: Array
     status: NDArray[np.int8]
 
+    @classmethod
+    def of_one(cls, n: Any, lam: Any, w_f: Any, quantities: dict[str, Any]) -> "CriticalStates":
+        """That of one cable, of numbers: arrays of shape (). In two thirds of the time that the constructor takes.
+
+        Parameters
+        ----------
+        n : int
+        lam, w_f : float
+        quantities : dict
+            The other attributes; status of its own kind.
+
+        Returns
+        -------
+        CriticalStates
+        """
+        made = object.__new__(cls)
+        # What a frozen dataclass goes a long way round for.
+        values, array = made.__dict__, np.array
+        values["n"], values["lam"], values["w_f"] = array(int(n)), array(float(lam)), array(float(w_f))
+        for name, value in quantities.items():
+            values[name] = array(value)
+        return made
+
     def sentence(self, index: Any = ()) -> str:
         """The status of one state in words.
 

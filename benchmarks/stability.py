@@ -74,7 +74,7 @@ def compute_reference() -> None:
     rows = []
     for case in CASES:
         motion = motion_of(case)
-        lengths = (motion.series[:, 0] / np.arange(1, motion.series.shape[2] + 1)).sum(1) * motion.sizes
+        lengths = (motion.series[:, :, 0] / np.arange(1, motion.series.shape[1] + 1)).sum(1) * motion.sizes
         found = towatlas.stability_of(case.found)
         guess = found.eigenvalues[case.found.expected][0] / case.gamma
         both = [peers.exact(case.found, case.found.expected, guess, np.repeat(lengths, n) / n) for n in (1, 2)]

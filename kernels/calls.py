@@ -110,7 +110,7 @@ _SHOTS, _ALGEBRA = (Shots, "f1 f1 f2 f2 f1"), (Algebra, "i2 i2 i1 i")
 shoot_drag = Kernel("drag_shots", "shoot_drag", _SHOTS, _ALGEBRA, "f i", (Reached, "f3 i1 i2 i1"), "i i")
 shoot_stiff = Kernel("drag_stiff", "shoot_stiff", (Marched, "c2 f1 f1 f1 i1 i1"), "f2 f i i i")
 expand_shapes = Kernel("variation", "expand_shapes", _SHOTS, _ALGEBRA, "f1 f f4 f2 f2 i1 i1 i i")
-evans = Kernel("variation", "evans", "f3 f1 i1 i1 f2 f2 b1 i i i1 c1 c1 f1 i i")
+evans = Kernel("evans", "evans", "f3 f1 i1 i1 f2 f2 b1 i i f i1 c1 c1 f1 i i")
 
 # What is compiled at once: the longest first, and next to each other what shares code.
 GROUPS = (

@@ -1,5 +1,4 @@
-"""The linearised motion about an equilibrium, from the fish up: coefficients on the equilibrium's own shot, and the
-Evans function.
+"""The linearised motion about an equilibrium, from the fish up: coefficients on the equilibrium's own shot.
 
 Units and axes of `kernels.drag`: lengths over g / Omega^2, times over 1 / Omega, u the arc length from the fish,
 position (X, Y, -h), F the force of the cable, pointing down it, T its size, V = (-Y, X, 0) the flow. With a
@@ -18,8 +17,7 @@ cable. With b = m / T^2, m = V . F, N = V - b F the flow across the cable and G 
           + kappa_s (2 beta d b W N^T - rho A V x P)
 
 with W = F x V, A of the side force as in `kernels.drag`, d = A^2 / rho and c = 3 A / rho - 2 d (m <= 0, see there).
-D(sigma) = det eta at the tow point, of the three solutions with eta = 1 at the fish, is zero at the growth rates and
-nowhere else. It is an entire function, real on the real axis.
+Growth rates are the zeros of a function of its solutions (`kernels.evans`).
 """
 
 from typing import Any
@@ -150,8 +148,7 @@ MATRICES = np.array(_matrices())
 # What is kept of a step: the tension, then the matrices P, T A and E P by rows.
 KEPT_ROWS = np.array([T, *P.ravel(), *TA.ravel(), *EP.ravel()])
 # Orders of their series: the equations know no more.
-TERMS = np.int64(MOTION_TERMS)
-TWO, SIX = np.int64(2), np.int64(6)
+TERMS, TWO = np.int64(MOTION_TERMS), np.int64(2)
 # Of the series of P, whose entries are at most 1, and of a wave at the end of a step: its last terms. Steps are
 # shortened for a wave's where they are so many times larger.
 LEFT, LARGER = 1e-15, 4.0
@@ -247,7 +244,7 @@ def _shorten(c, p, h, lane, reach, bound, room):
 def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, statuses, begin, stop):
     """Series of the coefficients along the shapes begin..stop-1, for |sigma| <= reach of each, eight side by side.
 
-    series : shape (rows, most steps, MOTION_ROWS, TERMS), in the part of a step; sizes : shape (rows, most steps),
+    series : shape (rows, most steps, TERMS, MOTION_ROWS), in the part of a step; sizes : shape (rows, most steps),
     of the steps in tau; starts : shape (rows, 3), the length of a bare tip that is left out, whether it is bare, and
     the largest flow along the cable over the speed of its waves.
     """
@@ -321,7 +318,7 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
                 power = 1.0
                 for k in range(TERMS):
                     for row in range(MOTION_ROWS):
-                        series[i, steps[i], row, k] = c[(KEPT_ROWS[row] * KEPT + k) * LANES + lane] * power
+                        series[i, steps[i], k, row] = c[(KEPT_ROWS[row] * KEPT + k) * LANES + lane] * power
                     power *= h[lane]
                 sizes[i, steps[i]] = h[lane] * p[PACE * LANES + lane]
                 steps[i] += 1
@@ -338,215 +335,3 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
                 busy = busy or jobs[lane] != IDLE
             for q in range(X, STATE):
                 store(c, q * KEPT, load(new, q))
-
-
-@helper
-def _turn(eta, zeta, place, real, imaginary):
-    """(sigma + S) eta into zeta, at a place of both."""
-    for part in range(2):
-        # Real parts, then imaginary ones.
-        x, y, z = load(eta, place + part), load(eta, place + TWO + part), load(eta, place + 4 + part)
-        other = 1 - part
-        sign = -1.0 if part == 0 else 1.0
-        xo, yo, zo = load(eta, place + other), load(eta, place + TWO + other), load(eta, place + 4 + other)
-        store(zeta, place + part, real * x + sign * (imaginary * xo) - y)
-        store(zeta, place + TWO + part, real * y + sign * (imaginary * yo) + x)
-        store(zeta, place + 4 + part, real * z + sign * (imaginary * zo))
-
-
-@helper
-def _march_step(series, size, drag, terms, eta, phi, zeta, alpha, real, imaginary, out):
-    """One step of the solutions in the lanes, with so many terms; eta, phi at order 0 to `out`, shape of 12 places."""
-    for k in range(terms):
-        at, ahead = k * SIX, (k + 1) * SIX
-        _turn(eta, zeta, at, real, imaginary)
-        _turn(zeta, alpha, at, real, imaginary)
-        # Real and imaginary parts side by side: sums that wait for each other would take twice as long.
-        e0 = e1 = e2 = f0 = f1 = f2 = broadcast(0.0)
-        g0 = g1 = g2 = h0 = h1 = h2 = broadcast(0.0)
-        for o in range(k + 1):
-            back = (k - o) * SIX
-            t = series[0, o]
-            f0, h0 = f0 - t * load(alpha, back), h0 - t * load(alpha, back + 1)
-            f1, h1 = f1 - t * load(alpha, back + 2), h1 - t * load(alpha, back + 3)
-            f2, h2 = f2 - t * load(alpha, back + 4), h2 - t * load(alpha, back + 5)
-            for j in range(3):
-                q, r = load(phi, back + 2 * j), load(phi, back + 2 * j + 1)
-                e0, g0 = e0 - series[1 + j, o] * q, g0 - series[1 + j, o] * r
-                e1, g1 = e1 - series[4 + j, o] * q, g1 - series[4 + j, o] * r
-                e2, g2 = e2 - series[7 + j, o] * q, g2 - series[7 + j, o] * r
-                if drag:
-                    y, z = load(zeta, back + 2 * j), load(zeta, back + 2 * j + 1)
-                    f0 = f0 + series[19 + j, o] * q - series[10 + j, o] * y
-                    h0 = h0 + series[19 + j, o] * r - series[10 + j, o] * z
-                    f1 = f1 + series[22 + j, o] * q - series[13 + j, o] * y
-                    h1 = h1 + series[22 + j, o] * r - series[13 + j, o] * z
-                    f2 = f2 + series[25 + j, o] * q - series[16 + j, o] * y
-                    h2 = h2 + series[25 + j, o] * r - series[16 + j, o] * z
-        share = size / (k + 1)
-        store(eta, ahead, e0 * share)
-        store(eta, ahead + 1, g0 * share)
-        store(eta, ahead + 2, e1 * share)
-        store(eta, ahead + 3, g1 * share)
-        store(eta, ahead + 4, e2 * share)
-        store(eta, ahead + 5, g2 * share)
-        store(phi, ahead, f0 * share)
-        store(phi, ahead + 1, h0 * share)
-        store(phi, ahead + 2, f1 * share)
-        store(phi, ahead + 3, h1 * share)
-        store(phi, ahead + 4, f2 * share)
-        store(phi, ahead + 5, h2 * share)
-    for i in range(SIX):
-        u = v = broadcast(0.0)
-        for k in range(terms, -1, -1):
-            u = u + load(eta, k * SIX + i)
-            v = v + load(phi, k * SIX + i)
-        store(out, i, u)
-        store(out, SIX + i, v)
-
-
-@helper
-def _orthonormalise(out, first, weight, z):
-    """Make the three solutions from lane `first` on orthonormal, phi weighted; the logarithm of their volume, and its
-    share that is in eta."""
-    for column in range(3):
-        for i in range(3):
-            for half in range(2):
-                place = (half * 6 + 2 * i) * LANES + first + column
-                factor = 1.0 if half == 0 else weight
-                z[3 * half + i, column] = factor * (out[place] + 1j * out[place + LANES])
-    volume = 0.0
-    for column in range(3):
-        # Twice: once is not enough where columns are nearly the same.
-        for _ in range(2):
-            for other in range(column):
-                dot = 0.0 + 0.0j
-                for i in range(6):
-                    dot += np.conj(z[i, other]) * z[i, column]
-                for i in range(6):
-                    z[i, column] -= dot * z[i, other]
-        total = 0.0
-        for i in range(6):
-            total += z[i, column].real ** 2 + z[i, column].imag ** 2
-        size = np.sqrt(total)
-        for i in range(6):
-            z[i, column] /= size
-        volume += np.log(size)
-    return volume
-
-
-@helper
-def _determinant(z):
-    return (
-        z[0, 0] * (z[1, 1] * z[2, 2] - z[1, 2] * z[2, 1])
-        - z[0, 1] * (z[1, 0] * z[2, 2] - z[1, 2] * z[2, 0])
-        + z[0, 2] * (z[1, 0] * z[2, 1] - z[1, 1] * z[2, 0])
-    )
-
-
-@helper
-def _inverse(a, out):
-    """Inverse of a real matrix of three rows."""
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        for m in range(3):
-            n, o = (m + 1) % 3, (m + 2) % 3
-            out[m, i] = a[j, n] * a[k, o] - a[j, o] * a[k, n]
-    det = a[0, 0] * out[0, 0] + a[0, 1] * out[1, 0] + a[0, 2] * out[2, 0]
-    for i in range(3):
-        for j in range(3):
-            out[i, j] /= det
-
-
-@helper
-def _turned(sigma, v):
-    """(sigma + S) v."""
-    return np.array([sigma * v[0] - v[1], sigma * v[1] + v[0], sigma * v[2]])
-
-
-@helper
-def _begin_solutions(series, start, fish, sigma, first, eta, phi, room):
-    """The three solutions with eta = 1 at the fish, in the lanes from `first` on.
-
-    fish : its mass over that of g / Omega^2 of cable, and C_f r.
-    """
-    rise, inverse = room[0], room[1]
-    bare = start[1] != 0.0
-    if bare:
-        # phi is all but proportional to the length below: T phi / u is what the equation makes of eta and phi.
-        for i in range(3):
-            for j in range(3):
-                rise[i, j] = -series[19 + 3 * i + j, 0]
-            rise[i, i] += series[0, 0] / start[0]
-        _inverse(rise, inverse)
-    for column in range(3):
-        e = np.zeros(3, np.complex128)
-        e[column] = 1.0
-        once = _turned(sigma, e)
-        twice = _turned(sigma, once)
-        f = np.zeros(3, np.complex128)
-        if bare:
-            for i in range(3):
-                for j in range(3):
-                    load_of = -series[0, 0] * twice[j]
-                    for n in range(3):
-                        load_of -= series[10 + 3 * j + n, 0] * once[n]
-                    f[i] += inverse[i, j] * load_of
-        else:
-            for i in range(3):
-                f[i] = -fish[0] * twice[i] - fish[1] * once[i] * (2.0 if i == 1 else 1.0)
-        for i in range(3):
-            at = 2 * i * LANES + first + column
-            eta[at], eta[at + LANES] = e[i].real, e[i].imag
-            phi[at], phi[at + LANES] = f[i].real, f[i].imag
-
-
-@kernel
-def evans(series, sizes, first, steps, starts, fish, drag, terms, every, shape, sigma, values_of, logs, begin, stop):
-    """D at each of the `sigma` begin..stop-1, shape (points,), as values_of exp(logs), two of one shape at a time.
-
-    series, sizes : of all steps of all shapes; first, steps : where those of each begin, and how many there are.
-    starts, fish, drag : by shapes; shape : of each point, those of one shape next to each other.
-    terms : of the series, up to TERMS; solutions are made orthonormal after `every` so many steps.
-    """
-    eta, phi = aligned((TERMS + 1) * SIX), aligned((TERMS + 1) * SIX)
-    zeta, alpha, out = aligned((TERMS + 1) * SIX), aligned((TERMS + 1) * SIX), aligned(2 * SIX)
-    parts, z, room = aligned(2), np.zeros((6, 3), np.complex128), np.zeros((2, 3, 3))
-    at = begin
-    while at < stop:
-        i = shape[at]
-        count = 2 if at + 1 < stop and shape[at + 1] == i else 1
-        for which in range(2):
-            point = at + min(which, count - 1)
-            _begin_solutions(series[first[i]], starts[i], fish[i], sigma[point], 3 * which, eta, phi, room)
-            logs[point] = 0.0
-            for column in range(3):
-                parts[3 * which + column] = sigma[point].real
-                parts[LANES + 3 * which + column] = sigma[point].imag
-        real, imaginary = load(parts, ZERO), load(parts, FIRST)
-        for step in range(steps[i]):
-            here = first[i] + step
-            _march_step(series[here], sizes[here], drag[i], terms, eta, phi, zeta, alpha, real, imaginary, out)
-            last = step == steps[i] - 1
-            if not last and (step + 1) % every != 0:
-                for place in range(SIX):
-                    store(eta, place, load(out, place))
-                    store(phi, place, load(out, SIX + place))
-                continue
-            for which in range(count):
-                # That of a wave of this frequency.
-                weight = 1.0 / (np.sqrt(series[here, 0, 0]) * (1.0 + abs(sigma[at + which])))
-                logs[at + which] += _orthonormalise(out, 3 * which, weight, z)
-                if last:
-                    values_of[at + which] = _determinant(z)
-                for column in range(3):
-                    for j in range(3):
-                        for half in range(2):
-                            place = 2 * j * LANES + 3 * which + column
-                            factor = 1.0 if half == 0 else 1.0 / weight
-                            value = factor * z[3 * half + j, column]
-                            if half == 0:
-                                eta[place], eta[place + LANES] = value.real, value.imag
-                            else:
-                                phi[place], phi[place + LANES] = value.real, value.imag
-        at += count

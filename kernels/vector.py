@@ -97,10 +97,9 @@ def _function(name: str) -> Callable:
     return lower
 
 
-def _pointer(context: Any, builder: Any, kind: Any, array: Any, place: Any) -> Any:
+def _pointer(context: Any, builder: Any, kind: Any, array: Any, first: Any) -> Any:
     data = context.make_array(kind)(context, builder, array).data
-    first = builder.gep(data, [builder.mul(place, ir.Constant(place.type, LANES))])
-    return builder.bitcast(first, _LLVM.as_pointer())
+    return builder.bitcast(builder.gep(data, [first]), _LLVM.as_pointer())
 
 
 @intrinsic
@@ -118,28 +117,36 @@ def _broadcast(typing_context: Any, a: Any) -> Any:
     return _vector(types.float64), lambda context, builder, sig, args: _spread(builder, args[0])
 
 
-@intrinsic
-def _load(typing_context: Any, array: Any, place: Any) -> Any:
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        index = context.cast(builder, args[1], sig.args[1], types.int64)
-        loaded = builder.load(_pointer(context, builder, sig.args[0], args[0], index))
-        # Unaligned, the loads are twice as slow.
-        loaded.align = _BYTES
-        return loaded
+def _loads(each: int) -> Any:
+    """Loads a vector from a place, of so many doubles."""
 
-    return _vector(array, place), lower
+    def load(typing_context: Any, array: Any, place: Any) -> Any:
+        def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            index = context.cast(builder, args[1], sig.args[1], types.int64)
+            first = builder.mul(index, ir.Constant(index.type, each))
+            loaded = builder.load(_pointer(context, builder, sig.args[0], args[0], first))
+            # Where none is aligned, loads are twice as slow.
+            loaded.align = _BYTES // LANES * each
+            return loaded
+
+        return _vector(array, place), lower
+
+    return intrinsic(load)
 
 
-@intrinsic
-def _store(typing_context: Any, array: Any, place: Any, value: Any) -> Any:
-    def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        index = context.cast(builder, args[1], sig.args[1], types.int64)
-        made = _as_vector(context, builder, sig.args[2], args[2])
-        stored = builder.store(made, _pointer(context, builder, sig.args[0], args[0], index))
-        stored.align = _BYTES
-        return context.get_dummy_value()
+def _stores(each: int) -> Any:
+    def store(typing_context: Any, array: Any, place: Any, value: Any) -> Any:
+        def lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            index = context.cast(builder, args[1], sig.args[1], types.int64)
+            first = builder.mul(index, ir.Constant(index.type, each))
+            made = _as_vector(context, builder, sig.args[2], args[2])
+            stored = builder.store(made, _pointer(context, builder, sig.args[0], args[0], first))
+            stored.align = _BYTES // LANES * each
+            return context.get_dummy_value()
 
-    return types.none(array, place, value), lower
+        return types.none(array, place, value), lower
+
+    return intrinsic(store)
 
 
 @intrinsic
@@ -151,18 +158,22 @@ def _where_less(typing_context: Any, a: Any, b: Any, x: Any, y: Any) -> Any:
     return _vector(a, b, x, y), lower
 
 
-def _interpreted_load(array: Any, place: int) -> Any:
-    return array[LANES * place : LANES * (place + 1)].copy()
+def _interpreted_load(array: Any, first: int) -> Any:
+    return array[first : first + LANES].copy()
 
 
-def _interpreted_store(array: Any, place: int, value: Any) -> None:
-    array[LANES * place : LANES * (place + 1)] = value
+def _interpreted_store(array: Any, first: int, value: Any) -> None:
+    array[first : first + LANES] = value
 
 
 # load(array, place), store(array, place, value), broadcast(number), square_root(a), absolute(a),
-# where_less(a, b, x, y): x where a < b, else y, as with a nan.
-load: Any = _interpreted_load if _INTERPRETED else _load
-store: Any = _interpreted_store if _INTERPRETED else _store
+# where_less(a, b, x, y): x where a < b, else y, as with a nan. load_from, store_from: from any double on.
+load: Any = (lambda array, place: _interpreted_load(array, LANES * place)) if _INTERPRETED else _loads(LANES)
+store: Any = (
+    (lambda array, place, value: _interpreted_store(array, LANES * place, value)) if _INTERPRETED else _stores(LANES)
+)
+load_from: Any = _interpreted_load if _INTERPRETED else _loads(1)
+store_from: Any = _interpreted_store if _INTERPRETED else _stores(1)
 broadcast: Any = (lambda value: np.full(LANES, value)) if _INTERPRETED else _broadcast
 square_root: Any = np.sqrt if _INTERPRETED else _sqrt
 absolute: Any = np.abs if _INTERPRETED else _absolute

@@ -217,3 +217,20 @@ def test_every_object_of_json_says_its_schema(capsys, atlas_path, equilibria_pat
     assert code == 0
     for row in answer if isinstance(answer, list) else [answer]:
         assert next(iter(row.items())) == ("schema_version", JSON_SCHEMA)
+
+
+@pytest.mark.parametrize("given", [None, "2"])
+def test_blas_takes_one_thread_where_nothing_else_is_asked_for(given):
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    code = (
+        "from towatlas.cli import main; main(['critical', '--lam', '10', '--wf', '1', '--solve'])\n"
+        "from threadpoolctl import threadpool_info; print(*(pool['num_threads'] for pool in threadpool_info()))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=environment | ({"OPENBLAS_NUM_THREADS": given} if given else {}),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.split("\n")[-2] == (given or "1")

@@ -207,7 +207,7 @@ def test_drag_is_linearised_as_differences_of_it_say():
         g2, system = found.gamma**2, found.system
         r = found.r_f[k] * g2
         force = np.array([g2 * system.m_f * r, -system.C_f * r * r, g2 * system.w_f])
-        tension, T_A, E_P = motion.series[0, 0, 0], motion.series[0, 10:19, 0], motion.series[0, 19:28, 0]
+        tension, T_A, E_P = motion.series[0, 0, 0], motion.series[0, 0, 10:19], motion.series[0, 0, 19:28]
         t, U = force / np.linalg.norm(force), np.array([0.0, r, 0.0])
         P = np.eye(3) - np.outer(t, t)
 
@@ -235,6 +235,26 @@ def test_without_drag_growth_rates_come_in_quadruples():
         D = values * np.exp(logs - logs[0])
         # D is even, and real on the real axis.
         np.testing.assert_allclose(D, [D[0], D[0].conj(), D[0].conj(), D[0]], rtol=1e-11)
+
+
+@pytest.mark.parametrize("drag", [0.0, 0.05, 0.5])
+def test_what_is_beside_a_point_and_terms_below_rounding_do_not_matter(drag, monkeypatch):
+    found = towatlas.equilibria(20.0, 10.0, 2.0, C=drag)
+    rng = np.random.default_rng(21)
+    for k in range(len(found)):
+        motion = motion_of(found, k)
+        sigma = rng.normal(0.0, 0.5, 7) + 1j * rng.uniform(0.0, motion.reach, 7)
+        values, logs = motion.evans(sigma)
+        for count in range(1, 7):
+            for first in range(7 - count):
+                some = slice(first, first + count)
+                both = motion.evans(sigma[some])
+                np.testing.assert_array_equal(both[0], values[some])
+                np.testing.assert_array_equal(both[1], logs[some])
+        with monkeypatch.context() as patch:
+            patch.setattr("towatlas.solve.motion.SMALL", 0.0)
+            whole, whole_logs = motion.evans(sigma)
+        np.testing.assert_allclose(values * np.exp(logs - whole_logs), whole, rtol=1e-11, atol=0.0)
 
 
 def test_mirror_images_have_the_same_growth_rates():

@@ -169,9 +169,9 @@ class Place:
     __slots__ = ("column", "powers", "row")
 
     def __init__(self, x: float, y: float):
-        # As _cell_of, whose arcsin may differ in the last bit from that of `math`.
-        self.column = column = min(int((0.5 + float(np.arcsin(x)) / math.pi) * CELLS), CELLS - 1)
-        self.row = row = min(int((0.5 + float(np.arcsin(y)) / math.pi) * CELLS), CELLS - 1)
+        # As _cell_of, but on an edge, where either will do.
+        self.column = column = min(int((0.5 + math.asin(x) / math.pi) * CELLS), CELLS - 1)
+        self.row = row = min(int((0.5 + math.asin(y) / math.pi) * CELLS), CELLS - 1)
         x = (x - _MIDDLE_LIST[column]) / _HALF_LIST[column]
         y = (y - _MIDDLE_LIST[row]) / _HALF_LIST[row]
         x2, y2 = x * x, y * y

@@ -25,6 +25,9 @@ def batches(work: NDArray[np.float64], most: float) -> Iterator[slice]:
     >>> [(s.start, s.stop) for s in batches(np.array([3.0, 3.0, 9.0, 1.0]), 7.0)]
     [(0, 2), (2, 3), (3, 4)]
     """
+    if work.size and work.sum() <= most:
+        yield slice(0, work.size)
+        return
     total = np.cumsum(np.minimum(np.nan_to_num(work), most))
     begin, before = 0, 0.0
     while begin < len(work):

@@ -212,7 +212,7 @@ def _panels(motion: Motion, degree: int, panel: float) -> _Panels:
     # From the upper end of the panel down.
     polynomials: Array = legendre.legvander(1.0 - 2.0 * share, degree)[:, None, :].astype(float)
     k, part, whole = _places(motion, _panel_of_step(motion, panel), share)
-    values = np.einsum("pqro,pqo->pqr", motion.series[k], part[..., None] ** np.arange(motion.series.shape[-1]))
+    values = (part[..., None, None] ** np.arange(motion.series.shape[1]) @ motion.series[k])[..., 0, :]
     P, TA, EP = (values[..., 1 + 9 * i : 10 + 9 * i].reshape(*k.shape, 3, 3) for i in range(3))
     length, tension = whole[:, None] * weights, values[..., 0]
     slope = _slopes(P, polynomials)
@@ -233,8 +233,8 @@ def _panels(motion: Motion, degree: int, panel: float) -> _Panels:
 def _places(motion: Motion, panel_of: Integers, share: Array) -> tuple[Integers, Array, Array]:
     """Where shares of the length of each panel are, by the panels of the steps: number and part of the step, shape
     (panels, shares); and those lengths."""
-    powers = np.arange(motion.series.shape[-1])
-    lengths = motion.series[:, 0] / (powers + 1) * motion.sizes[:, None]
+    powers = np.arange(motion.series.shape[1])
+    lengths = motion.series[:, :, 0] / (powers + 1) * motion.sizes[:, None]
     borders = np.concatenate([[0.0], np.cumsum(lengths.sum(1))])
     # Where panels begin, and the last one ends.
     starts = np.concatenate([np.flatnonzero(np.diff(panel_of, prepend=-1)), [len(panel_of)]])
@@ -242,7 +242,7 @@ def _places(motion: Motion, panel_of: Integers, share: Array) -> tuple[Integers,
     target = (borders[starts[:-1], None] + whole[:, None] * share).ravel()
     k = np.clip(np.searchsorted(borders, target, side="right") - 1, 0, len(panel_of) - 1)
     target -= borders[k]
-    along, tension = lengths[k], motion.series[k, 0] * motion.sizes[k, None]
+    along, tension = lengths[k], motion.series[k, :, 0] * motion.sizes[k, None]
     low, high = np.zeros(len(k)), np.ones(len(k))
     part = np.full(len(k), 0.5)
     for _ in range(NEWTON):
@@ -260,7 +260,7 @@ def _places(motion: Motion, panel_of: Integers, share: Array) -> tuple[Integers,
 def _panel_of_step(motion: Motion, panel: float) -> Integers:
     """Numbers of the panels that the steps belong to, from 0."""
     series = motion.series
-    start, end = series[:, :10, 0], series[:, :10].sum(-1)
+    start, end = series[:, 0, :10], series[:, :, :10].sum(1)
     length = motion.sizes * 0.5 * (start[:, 0] + end[:, 0])
     turn = np.sqrt(0.5 * np.square(end[:, 1:] - start[:, 1:]).sum(1))
     phase = (1.0 + motion.reach) * motion.sizes * np.sqrt(0.5 * (start[:, 0] + end[:, 0]))

@@ -30,6 +30,9 @@ PARTS, STEPS_A_PART = 8, 2_000
 # Terms of a step, and steps between two times that solutions are made orthonormal, where four digits suffice:
 # 1.5^10 / 10! = 2e-5, and a shot's own series, to rounding at 20, are to its root.
 ROUGH_TERMS, ROUGH_EVERY = 10, 3
+# Two terms in a row that are together below this end a series, of solutions of size 1: what follows, less than a tenth,
+# is lost in rounding.
+SMALL, ROUGH_SMALL = 2.0**-50, 1e-7
 REMEDY = "a shorter cable, a lower speed or less drag needs fewer steps"
 # Shapes side by side.
 TOGETHER = 8
@@ -41,7 +44,7 @@ class Motion:
 
     Attributes
     ----------
-    series : ndarray, shape (steps, rows, terms)
+    series : ndarray, shape (steps, terms, rows)
         Taylor coefficients of T and of the matrices P, T A and E P, in the part of a step, from the fish up.
     sizes : ndarray, shape (steps,)
         Of the steps, in tau, of which d(tau) = du / T.
@@ -115,7 +118,7 @@ class Motions:
         Parameters
         ----------
         shape : ndarray of int, shape (points,)
-            Which of the motions; points of one next to each other take half the time.
+            Which of the motions; four of one next to each other take as long as two apart.
         sigma, rough
             As of `Motion.evans`.
 
@@ -128,11 +131,11 @@ class Motions:
 
         sigma = np.ascontiguousarray(sigma, np.complex128)
         values, logs = np.empty(len(sigma), np.complex128), np.empty(len(sigma))
-        terms, every = (ROUGH_TERMS, ROUGH_EVERY) if rough else (MOTION_TERMS, 1)
+        terms, every, small = (ROUGH_TERMS, ROUGH_EVERY, ROUGH_SMALL) if rough else (MOTION_TERMS, 1, SMALL)
         of_shapes = self.series, self.sizes, self.first, self.steps, self.starts, self.fish, self.drag
 
         def some(part: slice) -> None:
-            evans(*of_shapes, terms, every, shape, sigma, values, logs, part.start, part.stop)
+            evans(*of_shapes, terms, every, small, shape, sigma, values, logs, part.start, part.stop)
 
         work = self.steps[shape].astype(float)
         most = STEPS_A_CALL if self.pool is None else min(STEPS_A_CALL, max(work.sum() / PARTS, STEPS_A_PART))
@@ -196,7 +199,7 @@ def _side_by_side(r_f: Array, gamma: Array, systems: Array, reach: Array, bound:
     shots = Shots(r_f * gamma2, gamma2, systems, np.zeros_like(systems), np.ones(rows))
     room = ROOM
     while True:
-        series, sizes = np.empty((rows, room, MOTION_ROWS, MOTION_TERMS)), np.empty((rows, room))
+        series, sizes = np.empty((rows, room, MOTION_TERMS, MOTION_ROWS)), np.empty((rows, room))
         starts, steps, codes = np.empty((rows, 3)), np.empty(rows, np.int64), np.empty(rows, np.int64)
         expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, codes, 0, rows)
         room *= 8

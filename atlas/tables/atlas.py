@@ -197,10 +197,8 @@ class Atlas:
         ['no such transition: the cable is not longer than lambda_cn', 'computed']
         """
         check_outside(outside)
-        if one := self._one(QUANTITIES, lam, w_f, n):
-            found = {name: np.array(one[name]) for name in QUANTITIES if name != "status"}
-            found["status"] = np.array(one["status"], np.int8)
-            return CriticalStates(np.array(n, np.int64), np.array(lam, float), np.array(w_f, float), **found)
+        if one := self._one(lam, w_f, n):
+            return CriticalStates.of_one(n, lam, w_f, one)
         lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
         table = self.critical.answer(QUANTITIES, outside, lam=lam.ravel(), w_f=w_f.ravel(), n=n.ravel())
         return CriticalStates(n=n, lam=lam, w_f=w_f, **_shaped(table, n))
@@ -503,8 +501,8 @@ class Atlas:
 
     def _quantity(self, name: str, lam: Any, w_f: Any, n: Any, outside: str) -> Any:
         check_outside(outside)
-        if one := self._one((name,), lam, w_f, n):
-            return np.int8(one[name]) if name == "status" else np.float64(one[name])
+        if one := self._one(lam, w_f, n):
+            return one[name] if name == "status" else np.float64(one[name])
 
         def plain(*, lam: Any, w_f: Any, n: Any) -> Any:
             lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
@@ -514,12 +512,12 @@ class Atlas:
         kind = np.int8 if name == "status" else np.float64
         return quantity_of(plain, name, SYMBOLS[name].long_name, kind, lam=lam, w_f=w_f, n=n)
 
-    def _one(self, names: tuple[str, ...], lam: Any, w_f: Any, n: Any) -> dict[str, float] | None:
-        """Quantities of one point that needs no check beyond its being in the table; None for all others."""
+    def _one(self, lam: Any, w_f: Any, n: Any) -> dict[str, Any] | None:
+        """All QUANTITIES of one point that needs no check beyond its being in the table; None for all others."""
         lam, w_f, n = one_number(lam), one_number(w_f), one_number(n)
         if lam is None or w_f is None or n is None:
             return None
-        return self.critical.one(names, lam=lam, w_f=w_f, n=n)
+        return self.critical.one(lam=lam, w_f=w_f, n=n)
 
 
 def _shaped(table: dict[str, NDArray[Any]], like: NDArray[Any]) -> dict[str, NDArray[Any]]:

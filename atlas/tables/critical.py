@@ -28,6 +28,7 @@ METHOD = "fold"
 INTERPOLANT = "support/interpolant"  # the group of the series
 FIELDS = ("gamma", "R_x0", "x_f", "z_f")
 QUANTITIES = (*FIELDS, "tension", "error", "status")
+HELD = np.int8(status.OK)
 EPS = float(np.finfo(float).eps)
 MOST_SLACK = 1e-6
 ROUNDINGS = 48.0  # as in kernels.folds, whose import would bring numba (test_error_constants_agree)
@@ -117,10 +118,7 @@ def from_field(name: str, field: Any, excess: Any, n: int) -> Any:
     -------
     float or ndarray, shape (points,)
     """
-    return _with_sign(name, np.exp(field), excess, n)
-
-
-def _with_sign(name: str, value: Any, excess: Any, n: int) -> Any:
+    value = np.exp(field)
     if name == "gamma":
         return value / excess**0.5
     return -value if name == "R_x0" or (name == "x_f" and n % 2) else value
@@ -268,19 +266,17 @@ class CriticalTable:
             values["error"] = self._error[n - 1, *at] + ROUNDINGS * EPS * (1.0 + lam / excess)
         return {name: column for name, column in values.items() if name in names}
 
-    def one(self, names: Collection[str], *, lam: float, w_f: float, n: float) -> dict[str, float] | None:
-        """As `answer`, of one point inside the table; in plain floats, which is twenty times faster for one.
+    def one(self, *, lam: float, w_f: float, n: float) -> dict[str, Any] | None:
+        """As `answer`, all QUANTITIES of one point inside the table; in plain floats, twenty times faster for one.
 
         Parameters
         ----------
-        names : collection of str
-            Some of QUANTITIES.
         lam, w_f, n : float
             Cable length, fish weight, number of the transition [-].
 
         Returns
         -------
-        dict of float, or None
+        dict of float, status an int8, or None
             None where the table does not hold the point, and for what is no cable: `answer` says why.
         """
         if not (1.0 <= n <= self.n_max and n == int(n) and 0.0 < lam < math.inf and 0.0 <= w_f <= self.axes.w_f.high):
@@ -295,23 +291,23 @@ class CriticalTable:
         if not self.axes.excess.low * (1.0 - slack) <= excess <= self.axes.excess.high * (1.0 + slack):
             return None
         low, high = self._log_excess
-        x = min(max((2.0 * float(np.log(excess)) - low - high) / (high - low), -1.0), 1.0)
-        y = min(max(2.0 * float(np.log1p(w_f / W_SCALE)) / self._log_w_f - 1.0, -1.0), 1.0)
-        order, place = int(n), Place(x, y)
-        cells = self._cells_of(order)
-        values = {
-            name: _with_sign(name, math.exp(field), excess, order)
-            for name, field in zip(FIELDS, cells.values(place), strict=True)
-            if name in names or name == "R_x0"
+        x = (2.0 * float(np.log(excess)) - low - high) / (high - low)
+        y = 2.0 * float(np.log1p(w_f / W_SCALE)) / self._log_w_f - 1.0
+        x, y = -1.0 if x < -1.0 else x if x < 1.0 else 1.0, -1.0 if y < -1.0 else y if y < 1.0 else 1.0
+        order = int(n)
+        gamma, R_x0, x_f, z_f = self._cells_of(order).values(Place(x, y))
+        R_x0 = -math.exp(R_x0)
+        _, rows, columns = self._error.shape
+        row, column = min(int(0.5 * (y + 1.0) * rows), rows - 1), min(int(0.5 * (x + 1.0) * columns), columns - 1)
+        return {
+            "gamma": math.exp(gamma) / excess**0.5,
+            "R_x0": R_x0,
+            "x_f": -math.exp(x_f) if order % 2 else math.exp(x_f),
+            "z_f": math.exp(z_f),
+            "tension": abs(complex(w_f + lam, R_x0)),
+            "error": self._error.item(order - 1, row, column) + ROUNDINGS * EPS * longer,
+            "status": HELD,
         }
-        values["status"] = float(status.OK)
-        if "tension" in names:
-            values["tension"] = abs(complex(w_f + lam, values["R_x0"]))
-        if "error" in names:
-            rows, columns = self._error.shape[1:]
-            row, column = min(int(0.5 * (y + 1.0) * rows), rows - 1), min(int(0.5 * (x + 1.0) * columns), columns - 1)
-            values["error"] = self._error.item(order - 1, row, column) + ROUNDINGS * EPS * longer
-        return values
 
     def series(self, name: str, n: int) -> Array:
         """Chebyshev coefficients of one quantity.
