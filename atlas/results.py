@@ -58,15 +58,15 @@ class CriticalStates(Answer):
     status: NDArray[np.int8]
 
     @classmethod
-    def of_one(cls, n: Any, lam: Any, w_f: Any, quantities: dict[str, Any]) -> "CriticalStates":
+    def of_one(cls, quantities: dict[str, Any], *, lam: Any, w_f: Any, n: Any) -> "CriticalStates":
         """That of one cable, of numbers: arrays of shape (). In two thirds of the time that the constructor takes.
 
         Parameters
         ----------
-        n : int
-        lam, w_f : float
         quantities : dict
             The other attributes; status of its own kind.
+        lam, w_f : float
+        n : int
 
         Returns
         -------

@@ -198,7 +198,7 @@ class Atlas:
         """
         check_outside(outside)
         if one := self._one(lam, w_f, n):
-            return CriticalStates.of_one(n, lam, w_f, one)
+            return CriticalStates.of_one(one, lam=lam, w_f=w_f, n=n)
         lam, w_f, n = check_broadcast(lam=check_real("lam", lam), w_f=check_real("w_f", w_f), n=check_order(n))
         table = self.critical.answer(QUANTITIES, outside, lam=lam.ravel(), w_f=w_f.ravel(), n=n.ravel())
         return CriticalStates(n=n, lam=lam, w_f=w_f, **_shaped(table, n))

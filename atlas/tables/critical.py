@@ -214,10 +214,11 @@ class CriticalTable:
             raise ValueError(self._complaint(unanswered, lam=lam, w_f=w_f, n=n))
         table: dict[str, NDArray[Any]] = {name: np.full(len(n), np.nan) for name in names if name != "status"}
         work = Work(len(n))
-        for order in range(1, self.n_max + 1):
+        for order in np.flatnonzero(np.bincount(n[inside])).tolist():
             rows = np.flatnonzero(inside & (n == order))
             for begin in range(0, len(rows), BLOCK):
-                some = rows[begin : begin + BLOCK]
+                block = slice(begin, begin + BLOCK)
+                some = block if len(rows) == len(n) else rows[block]
                 values = self._interpolate(table, order, work, lam=lam[some], w_f=w_f[some], excess=excess[some])
                 for name, column in values.items():
                     table[name][some] = column
@@ -281,9 +282,9 @@ class CriticalTable:
         """
         if not (1.0 <= n <= self.n_max and n == int(n) and 0.0 < lam < math.inf and 0.0 <= w_f <= self.axes.w_f.high):
             return None
-        # The absolute value of a complex number and numpy's functions, where those of `math` may differ in the last bit
-        # from what arrays get: near the threshold it would show.
-        excess = (lam - (2.0 * n - 1.0)) - 1.0 / (w_f + abs(complex(1.0, w_f)))
+        # As arrays get it, to the last bit: near the threshold it would show. So would numpy's functions from those of
+        # `math`.
+        excess = (lam - (2.0 * n - 1.0)) - 1.0 / (w_f + math.sqrt(1.0 + w_f * w_f))
         if not excess > 0.0:
             return None
         longer = 1.0 + lam / excess
