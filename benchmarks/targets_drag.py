@@ -17,6 +17,7 @@ from benchmarks.samples_drag import FAMILIES, SAMPLES, arrays, shape_reference
 from benchmarks.targets import Target
 from benchmarks.timing import readable
 from towatlas.kernels import status
+from towatlas.solve.growth import Spectrum
 from towatlas.solve.jets import Jets, jets_of
 from towatlas.solve.shots import Array, direction_of, shoot
 
@@ -118,7 +119,8 @@ def _growth(rows: int, speeds: int) -> list[Target]:
         allowed = 600.0 / MANY
         found.append(_allowed(f"growth rates of neighbours {name}, shapes included", allowed, used / shapes, note))
         cables = zip(lam[:, 0], np.linspace(4.0, 7.0, len(lam)), strict=True)
-        found.append(_alone(name, [towatlas.equilibria(length, 1352.0, speed, C=c) for length, speed in cables]))
+        shapes_of = [towatlas.equilibria(length, 1352.0, speed, C=c) for length, speed in cables]
+        found += [_alone(name, shapes_of), _evans(name, shapes_of)]
     return found
 
 
@@ -129,6 +131,23 @@ def _alone(name: str, found: list[towatlas.Equilibria]) -> Target:
     used = sum(times) / shapes
     note = f"{1e3 * used:.1f} ms, {shapes} shapes of {len(found)} cables, lam 35 to 40, w_f 1352, gamma 4 to 7"
     return _allowed(f"leading eigenvalue and count of a shape {name}, 5 ms", 5e-3, used, note)
+
+
+def _evans(name: str, found: list[towatlas.Equilibria], calls: int = 20) -> Target:
+    """The Evans function of each shape, one point alone."""
+    times = []
+    for one in found:
+        for r_f in one.r_f:
+            spectrum = Spectrum(one.system, one.gamma, float(r_f))
+            motion, sigma = spectrum.motion(spectrum.reach), spectrum.roots.sigma[:1]
+            motion.evans(sigma)
+            used = min(_cpu(lambda m=motion, at=sigma: [m.evans(at) for _ in range(calls)]) for _ in range(5)) / calls
+            times.append((used, len(motion.sizes)))
+    used = float(np.mean([time for time, _ in times]))
+    note = (
+        f"{1e6 * used:.0f} us, {len(times)} shapes; the slowest {1e6 * max(times)[0]:.0f} us, in {max(times)[1]} steps"
+    )
+    return _allowed(f"one value of the Evans function {name}, 100 us", 1e-4, used, note)
 
 
 def _shots(rows: int) -> list[Target]:
