@@ -253,8 +253,9 @@ def lookup(rows: list[Row], path: Path) -> None:
         panel(axes, part, "gamma")
         axes.set_xlabel("time per point [us]")
         axes.set_title("one point a call" if one else f"{part[0].setting} a call", loc="left")
-        low, high = (f([row.microseconds for row in part]) for f in (min, max))
-        axes.set_xlim(low / 2.5, high * 2.5)
+        low, high = (np.log10(f([row.microseconds for row in part])) for f in (min, max))
+        # Whole decades: within one, labels of parts of it lie on each other.
+        axes.set_xlim(10.0 ** np.floor(low - 0.2), 10.0 ** np.ceil(high + 0.2))
     both[0].set_ylim(FLOOR * 3, 1.0)
     both[0].set_ylabel("relative error of gamma_c1 [-]")
     handles, labels = both[0].get_legend_handles_labels()
