@@ -151,6 +151,22 @@ def at_most(share: float) -> Iterator[None]:
         _budget.reset(token)
 
 
+@contextmanager
+def to_the_end() -> Iterator[None]:
+    """Let what is within come to its end, whatever is left of the patience.
+
+    Returns
+    -------
+    context manager
+        For `with`; for little work, without which what was done is no answer.
+    """
+    token = _budget.set(None)
+    try:
+        yield
+    finally:
+        _budget.reset(token)
+
+
 def each_allowed() -> float:
     """What each of many computations may take, where only they are limited, and not all of them together.
 

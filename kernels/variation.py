@@ -75,7 +75,7 @@ from towatlas.kernels.drag import (
 )
 from towatlas.kernels.drag_shots import IDLE, begin_lanes, landing, past_axis
 from towatlas.kernels.system import C_F, M_F, W_F
-from towatlas.kernels.vector import LANES, aligned, broadcast, load, store
+from towatlas.kernels.vector import LANES, absolute, aligned, broadcast, load, square_root, store, where_less
 
 # Quantities after those of kernels.drag: what the matrices are made of, then these, by rows.
 UNIT, TT, KGB, KB, MKB, AR, A2R, KC, BA, KBA, KAX, KAY = np.arange(QUANTITIES, QUANTITIES + 12)
@@ -149,8 +149,8 @@ MATRICES = np.array(_matrices())
 KEPT_ROWS = np.array([T, *P.ravel(), *TA.ravel(), *EP.ravel()])
 # Orders of their series: the equations know no more.
 TERMS, TWO = np.int64(MOTION_TERMS), np.int64(2)
-# Of the series of P, whose entries are at most 1, and of a wave at the end of a step: its last terms. Steps are
-# shortened for a wave's where they are so many times larger.
+# Last terms of the series of the matrices over a step, as parts of what they change of a wave, and of a wave itself.
+# Steps are shortened for a wave's where they are so many times larger.
 LEFT, LARGER = 1e-15, 4.0
 
 
@@ -194,10 +194,10 @@ def _norm(c, first, lane):
 
 
 @helper
-def _turn_left(c, k, lane):
-    """Largest coefficient of order k of P."""
+def _largest(c, first, k, lane):
+    """Largest coefficient of order k of a matrix."""
     largest = 0.0
-    for at in range(P[0, 0], P[0, 0] + 9):
+    for at in range(first, first + 9):
         largest = max(largest, abs(c[(at * KEPT + k) * LANES + lane]))
     return largest
 
@@ -223,21 +223,45 @@ def _wave_left(c, h, phase, lane, room):
 @helper
 def _shorten(c, p, h, lane, reach, bound, room):
     """Step within h in which solutions for |sigma| <= reach change by a factor of about exp(bound), and which their
-    series and that of P resolve: in a layer, where the cable turns, the shot's own step need not."""
-    for k in range(ORDER - 2, ORDER):
-        left = _turn_left(c, k, lane)
-        if left * h**k > LEFT:
-            h = (LEFT / left) ** (1.0 / k)
+    series and those of the matrices resolve: in a layer, where the cable turns, and where it has passed the axis, the
+    shot's own step need not."""
     tension = c[T * KEPT * LANES + lane]
     fast = reach + 1.0
     wave = np.sqrt(fast * (tension * fast + _norm(c, TA[0, 0], lane)))
     rate, pace = max(wave, _norm(c, EP[0, 0], lane)), p[PACE * LANES + lane]
     h = min(h, bound / (rate * pace))
+    for k in range(ORDER - 2, ORDER):
+        # phi is sqrt(T) fast times eta, and entries of P are at most 1.
+        left = _largest(c, P[0, 0], k, lane)
+        left = max(left, h * pace * _largest(c, TA[0, 0], k, lane) / np.sqrt(tension))
+        left = max(left, h * pace * _largest(c, EP[0, 0], k, lane))
+        if left * h**k > LEFT:
+            h = (LEFT / left) ** (1.0 / k)
     for _ in range(2):
         left = _wave_left(c, h, h * pace * wave, lane, room)
         if left > LEFT * LARGER:
             h *= (LEFT / left) ** (1.0 / ORDER)
     return h
+
+
+@helper
+def _past_axis(c, p, new, h, groups, room):
+    """Into room: what steps past the axis leave of T A, above 1 where too much.
+
+    The force is as the square of the distance there, but T A as the distance, of which series know one branch only:
+    see `kernels.drag_shots.past_axis`.
+    """
+    x, y, fx, fy, fz = (load(new, X), load(new, Y), load(new, FX), load(new, FY), load(new, FZ))
+    rho, along = square_root(x * x + y * y), x * fx + y * fy
+    step, tension = load(h, ZERO), load(c, T * KEPT)
+    normal = absolute(values(c, G * KEPT, ZERO, step) - square_root(fz * fz * rho * rho + along * along))
+    off = load(p, KAPPA) * normal
+    if groups[ON_SIDE]:
+        side = absolute(values(c, RHO * KEPT, ZERO, step) - rho) * tension
+        off = off + absolute(load(p, KAPPA_S)) * side
+    # Of the step, what is past the axis.
+    past, whole = rho / square_root(fx * fx + fy * fy), step * load(p, PACE)
+    store(room, ZERO, off * where_less(past, whole, past, whole) / (square_root(tension) * LEFT))
 
 
 @kernel
@@ -250,7 +274,8 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
     """
     count = np.int64(1)
     c, scratch = aligned(ALL_QUANTITIES * KEPT), aligned(QUANTITIES * KEPT)
-    p, new, h, target, ends, room = aligned(PARAMETERS), aligned(STATE), aligned(1), aligned(1), aligned(1), aligned(3)
+    p, new, h, target, ends = aligned(PARAMETERS), aligned(STATE), aligned(1), aligned(1), aligned(1)
+    room, left = aligned(3), aligned(1)
     paid, low = np.zeros(LANES), np.zeros(LANES)
     work = (c, scratch, p, ends, paid, low)
     groups, terms = np.full(GROUPS, True), np.empty((2, ORDER + 1))
@@ -298,9 +323,10 @@ def expand_shapes(shots, algebra, reach, bound, series, sizes, starts, steps, st
                 if not groups[ACROSS]:
                     break
                 past_axis(c, p, new, h, count, TRUNCATION, room)
+                _past_axis(c, p, new, h, groups, left)
                 for lane in range(LANES):
                     past = room[lane] > 1.0 or (groups[ON_SIDE] and room[LANES + lane] > 1.0)
-                    if past and jobs[lane] != IDLE:
+                    if (past or left[lane] > 1.0) and jobs[lane] != IDLE:
                         h[lane] *= 0.5
                         ended[lane] = False
                         again = True

@@ -14,8 +14,9 @@ from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.galerkin import modes
 from towatlas.solve.growth import Spectrum
 from towatlas.solve.motion import BOUND, motions
+from towatlas.solve.positions import error_of
 from towatlas.solve.spectrum import polish, together
-from towatlas.solve.stability import spectrum_of
+from towatlas.solve.stability import bodies_of, spectrum_of
 from towatlas.system import System
 
 # Largest |sigma| that the program looks at, over gamma.
@@ -171,3 +172,64 @@ def test_what_is_known_is_told_where_the_patience_ends(monkeypatch):
     assert asked == [0, 1]
     assert (one.status, one.unstable) == (status.NOT_COUNTED, whole.unstable)
     assert one.roots.sigma[0] == whole.roots.sigma[0]
+    bodies = bodies_of(found, [0])[0]
+    with towatlas.patience(1e-9):
+        assert error_of(one.roots, *bodies, found.error[0]) == error_of(whole.roots, *bodies, found.error[0]) < 1e-12
+
+
+def leading_of(found, r_f):
+    """The leading growth rate of the shape at r_f, and the error that is stated of it."""
+    k = int(np.argmin(np.abs(found.r_f - r_f)))
+    motion, moved = bodies_of(found, [k])[k]
+    roots = spectrum_of(found, k, motion).roots
+    return k, roots.sigma[:1], error_of(roots, motion, moved, found.error[k])
+
+
+def otherwise(found, k, zero, *, ulps, bound=BOUND):
+    """The same zero with the fish moved by some last bits, or steps of another size."""
+    r_f = found.r_f[k]
+    for _ in range(abs(ulps)):
+        r_f = np.nextafter(r_f, np.inf * np.sign(ulps))
+    motion = motions(np.array([r_f]), np.array([found.gamma]), found.system.row()[None], REACH, bound)[0]
+    return polish(motion, zero, zero)[0].sigma[0]
+
+
+@pytest.mark.parametrize(
+    ("lam", "w_f", "C_s", "w", "gamma", "r_f"),
+    [
+        (4.125380812131874, 0.010893676716199225, -0.9736964135470053, 0.1585520579127728, 3.359364009441982, 1.13218),
+        (10.830154799283722, 0.8040008760721505, 0.7669312983748937, 0.47150692737116784, 1.3115975482595401, 1.12448),
+        (
+            2.622805584630769,
+            0.003786375235004277,
+            -0.1108073294829675,
+            0.11440723005946005,
+            0.9275662326881653,
+            1.61007,
+        ),
+    ],
+)
+def test_a_cable_through_the_axis_in_a_side_force(lam, w_f, C_s, w, gamma, r_f):
+    """T A is as |rho| there: where a step went past the axis as far as a shot's may, rates were 1e-12 to 5e-11 off."""
+    found = solve_equilibria(System.of(lam, w_f, C_s=C_s, w=w), gamma)
+    k, zero, stated = leading_of(found, r_f)
+    assert stated < 1e-12
+    for ulps, bound in ((0, 1.4), (0, 0.7), (1, BOUND), (-2, BOUND)):
+        assert abs(otherwise(found, k, zero, ulps=ulps, bound=bound) - zero[0]) <= stated
+
+
+def test_growth_that_moves_a_million_times_as_far_as_the_fish():
+    """The error of r_f, all of it rounding, counts in the growth rate by its slope: 1e-14 was stated once."""
+    system = System.of(19.585471744893475, 0.020061130139090257, C_s=0.5076961044275881, w=0.9112838487376911)
+    found = solve_equilibria(system, 3.670775267165097)
+    k, zero, stated = leading_of(found, 2.2409199231961345)
+    far = abs(otherwise(found, k, zero, ulps=4) - zero[0])
+    assert 1e-10 < far <= stated < 100.0 * far
+
+
+def test_no_error_is_below_rounding():
+    """Where D is steep, 1e-19 was stated of numbers of size 1."""
+    found = solve_equilibria(System.of(11.4409, 1.42773, m_f=1012.97, C=0.66417, C_f=0.016923, w=0.34315), 0.99538)
+    for k in range(len(found)):
+        roots = spectrum_of(found, k).roots
+        assert (roots.error >= np.finfo(float).eps * np.abs(roots.sigma)).all()

@@ -12,7 +12,8 @@ from towatlas.scene.jumps import SceneAnswer
 from towatlas.scene.models import system_of, with_drag
 from towatlas.scene.scene import MODELS, Scene, patient_with
 from towatlas.solve.equilibria import solve_equilibria
-from towatlas.solve.stability import looked_at, spectrum_of
+from towatlas.solve.positions import error_of
+from towatlas.solve.stability import bodies_of, looked_at, spectrum_of
 
 # Of the patience with a scene; the shapes themselves stand without.
 SHARE = 0.2
@@ -118,21 +119,22 @@ def verdict_of(scene: Scene, found: Equilibria, k: int) -> Verdict:
     Verdict
     """
     try:
-        answer = spectrum_of(found, k)
-    except (ArithmeticError, np.linalg.LinAlgError) as error:
-        return Verdict("unknown", nan, nan, nan, -1, status.NOT_COUNTED, str(error))
+        motion, moved = bodies_of(found, [k])[k]
+        answer = spectrum_of(found, k, motion)
+        error = error_of(answer.roots, motion, moved, float(found.error[k]))
+    except (ArithmeticError, np.linalg.LinAlgError) as reason:
+        return Verdict("unknown", nan, nan, nan, -1, status.NOT_COUNTED, str(reason))
     unit = abs(found.gamma) * rate_unit(scene)
     known = answer.status == status.OK
-    growth, frequency, error_of = nan, nan, nan
+    growth, frequency = nan, nan
     if len(answer.roots):
         leading = complex(answer.roots.sigma[0])
         growth, frequency = leading.real * unit, leading.imag * unit / (2.0 * pi)
-        error_of = max(float(answer.roots.error[0]), float(found.error[k])) * unit
     return Verdict(
         kind=answer.kind,
         growth=growth,
         frequency=frequency,
-        error=error_of,
+        error=error * unit,
         unstable=answer.unstable if known else -1,
         code=answer.status,
         reason="" if known else status.SENTENCES[answer.status],

@@ -110,7 +110,8 @@ def quantities(row: Integers, x: Array, systems: Array, gamma: Array) -> dict[st
         # x, the position towards the tow point, changes sign where the angle left is 90 degrees and every 180 more.
         "nodes": np.floor(ends.angle / np.pi + 0.5).astype(np.int64),
         "near_axis": (r / unit < NEAR_AXIS) & (np.diff(row, prepend=-1) != 0),
-        "error": rounding / np.abs(ends.log_rho[:, 1]),
+        # Where the end of a shot moves far with the fish, the rounding of log r itself is what is left.
+        "error": np.maximum(rounding / np.abs(ends.log_rho[:, 1]), EPS * (1.0 + np.abs(x))),
     }
 
 

@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 from towatlas.kernels import status
 from towatlas.kernels.system import C_F, C_S, C_T, LAM, C
 from towatlas.solve.growth import STILL, Spectrum, kind_of, reach_at
-from towatlas.solve.motion import Array, Complex, Integers, Motions, motions
-from towatlas.solve.spectrum import FINE, NOISE, ROUGH, Function, Roots, room_of, rough_zeros, secants
+from towatlas.solve.motion import Array, Complex, Integers, Motion, Motions, motions
+from towatlas.solve.spectrum import FINE, ROUGH, Function, Roots, noise_of, room_of, rough_zeros, secants
 from towatlas.solve.winding import count_zeros
 from towatlas.system import System
 
-EPS = 2.0**-52
 # Zeros are followed to this many times the reach; the disc without drag is so much larger than that of what grows.
 FOLLOWED, SLACK = 1.25, 1.02
 # A zero that moved by more from one shape to the next, in units of Omega, is not foretold to move on.
@@ -59,8 +58,8 @@ class Zeros:
 
 @dataclass(frozen=True)
 class Answer:
-    """Of one shape: its leading growth rate and its error, in units of Omega, nan where there is none, and the rest as
-    of `Spectrum`; with zeros for its neighbours."""
+    """Of one shape: its leading growth rate and its error as a zero of D, in units of Omega, nan where there is none,
+    and the rest as of `Spectrum`; with zeros for its neighbours, and its motion."""
 
     sigma: complex
     error: float
@@ -69,6 +68,7 @@ class Answer:
     kind: str
     status: int
     zeros: Zeros | None
+    motion: Motion | None
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,9 @@ def solve_shapes(shapes: Shapes, parents: Sequence[Zeros | None], pool: Executor
 
         def alone(k: int) -> Answer:
             system, index = System(*(float(value) for value in some_rest.systems[k])), int(some_rest.index[k])
-            return _alone(Spectrum(system, float(some_rest.gamma[k]), float(some_rest.r_f[k]), index, bodies[k]))
+            return _alone(
+                Spectrum(system, float(some_rest.gamma[k]), float(some_rest.r_f[k]), index, bodies[k]), bodies[k]
+            )
 
         # With the patience of the caller.
         contexts = [copy_context() for _ in rest]
@@ -139,7 +141,7 @@ def solve_shapes(shapes: Shapes, parents: Sequence[Zeros | None], pool: Executor
     return [answer for answer in found if answer is not None]
 
 
-def _alone(spectrum: Spectrum) -> Answer:
+def _alone(spectrum: Spectrum, motion: Motion) -> Answer:
     """Of a shape by itself."""
     roots, guesses = spectrum.roots, spectrum.guesses
     leading = (complex(roots.sigma[0]), float(roots.error[0])) if len(roots) else (complex(np.nan), np.nan)
@@ -153,7 +155,7 @@ def _alone(spectrum: Spectrum) -> Answer:
         sigma = np.concatenate([roots.sigma, near[apart > CLOSE]])
         nothing = np.full(len(sigma), np.nan + 0j)
         zeros = Zeros(sigma, nothing, nothing) if len(sigma) else None
-    return Answer(*leading, unstable, spectrum.index, spectrum.kind, spectrum.status, zeros)
+    return Answer(*leading, unstable, spectrum.index, spectrum.kind, spectrum.status, zeros, motion)
 
 
 class _Followed:
@@ -262,7 +264,7 @@ class _Followed:
         room = np.full(len(start), 10.0 * CLOSE)
         found = secants(function, start, room, FINE, slope, _lines_of(start, self.drag))
         steps = np.array([len(self.bodies[k].sizes) for k in self.which[which]])
-        noise = NOISE * EPS * np.sqrt(steps[owner]) / np.abs(found.slope * np.exp(-moved))
+        noise = noise_of(steps[owner], np.abs(found.slope * np.exp(-moved)), found.sigma)
         roots: list[Roots | None] = []
         for k, (part, some) in enumerate(zip(zeros, wanted, strict=True)):
             mine = owner == k
@@ -284,7 +286,8 @@ class _Followed:
         if not self.drag and (index < 0 or unstable > index or (index - unstable) % 2):
             return None
         leading, error = complex(roots.sigma[0]), float(roots.error[0])
-        return Answer(leading, error, unstable, index, kind_of(unstable, leading, error), status.OK, zeros)
+        kind = kind_of(unstable, leading, error)
+        return Answer(leading, error, unstable, index, kind, status.OK, zeros, self.bodies[k])
 
 
 def _wanted(sigma: Complex, drag: bool) -> NDArray[np.bool_]:

@@ -15,6 +15,7 @@ from towatlas.solve.growth import REMEDY
 from towatlas.solve.many import equilibria_many
 from towatlas.solve.motion import Array, Integers
 from towatlas.solve.neighbours import Answer, Shapes, Zeros, solve_shapes
+from towatlas.solve.positions import errors_with_fish, with_fish_moved
 from towatlas.system import System
 
 if TYPE_CHECKING:
@@ -150,8 +151,10 @@ def growth_columns(
                         for a, b in zip(i, k, strict=True)
                     ]
                     shapes = Shapes(systems[i], gamma[i], r_f[i, k], index[i, k])
-                    for a, b, answer in zip(i, k, _answers(shapes, parents, pool), strict=True):
-                        _put(out, (a, b), answer, abs(gamma[a]), error[a, b])
+                    answers = _answers(shapes, parents, pool)
+                    moves = _errors_with_fish(shapes, answers, error[i, k], pool)
+                    for a, b, answer, move in zip(i, k, answers, moves, strict=True):
+                        _put(out, (a, b), answer, abs(gamma[a]), move)
                         if answer.zeros is not None:
                             mine = known.setdefault(int(a), [])
                             mine.append((int(nodes[a, b]), int(index[a, b]), float(r_f[a, b]), answer.zeros))
@@ -165,14 +168,27 @@ def _answers(shapes: Shapes, parents: list[Zeros | None], pool: ThreadPoolExecut
         return solve_shapes(shapes, parents, pool)
     except TooMuchWork:
         if len(parents) == 1:
-            return [Answer(complex(np.nan), np.nan, -1, -1, "unknown", status.STEP_LIMIT, None)]
+            return [Answer(complex(np.nan), np.nan, -1, -1, "unknown", status.STEP_LIMIT, None, None)]
         halves = np.array_split(np.arange(len(parents)), 2)
         return [answer for half in halves for answer in _answers(shapes.part(half), [parents[k] for k in half], pool)]
 
 
+def _errors_with_fish(shapes: Shapes, answers: list[Answer], relative: Array, pool: ThreadPoolExecutor) -> Array:
+    """Of the leading growth rates, nan where there are none."""
+    errors = np.full(len(answers), np.nan)
+    which = np.array([k for k, answer in enumerate(answers) if np.isfinite(answer.sigma)], np.int64)
+    if not len(which):
+        return errors
+    bodies = [motion for k in which if (motion := answers[k].motion) is not None]
+    some, sigma = shapes.part(which), np.array([answers[k].sigma for k in which], np.complex128)
+    moved = with_fish_moved(bodies, some.r_f, some.gamma, some.systems, relative[which], pool)
+    errors[which] = errors_with_fish(bodies, moved, sigma, relative[which], pool)
+    return errors
+
+
 def _put(out: dict[str, NDArray[Any]], at: tuple[int, int], answer: Answer, speed: float, error: float) -> None:
     out["growth"][at], out["frequency"][at] = answer.sigma.real * speed, answer.sigma.imag * speed
-    out["growth_error"][at] = max(answer.error, error) * speed
+    out["growth_error"][at] = (answer.error + error) * speed
     for name in ("unstable", "index", "kind"):
         out[name][at] = getattr(answer, name)
     out["growth_status"][at] = answer.status

@@ -157,6 +157,25 @@ def room_of(guesses: Complex, others: Complex) -> Array:
     return np.minimum(FAR * (1.0 + np.abs(guesses)), OF_THE_WAY * nearest)
 
 
+def noise_of(steps: int | Integers, slope: Array, sigma: Complex) -> Array:
+    """What rounding leaves of zeros.
+
+    Parameters
+    ----------
+    steps : int or ndarray of int, shape (roots,)
+        Of the shapes.
+    slope : ndarray, shape (roots,)
+        Size of the slope of D there.
+    sigma : ndarray of complex, shape (roots,)
+
+    Returns
+    -------
+    ndarray, shape (roots,)
+        In units of Omega.
+    """
+    return np.asarray(NOISE * EPS * np.sqrt(steps) / slope + EPS * (1.0 + np.abs(sigma)))
+
+
 def polish(motion: Motion, guesses: Complex, others: Complex) -> tuple[Roots, NDArray[np.bool_]]:
     """Zeros of the Evans function next to guesses, by secants, all of them side by side.
 
@@ -188,7 +207,7 @@ def polish(motion: Motion, guesses: Complex, others: Complex) -> tuple[Roots, ND
     near_guesses = np.where(near.settled, near.sigma, guesses)
     slope = np.where(near.settled, near.slope, np.nan)
     found = secants(partial(function, rough=False), near_guesses, room, FINE, slope)
-    noise = NOISE * EPS * np.sqrt(len(motion.sizes)) / np.abs(found.slope)
+    noise = noise_of(len(motion.sizes), np.abs(found.slope), found.sigma)
     return Roots(found.sigma, np.maximum(found.error, noise)), found.settled & (np.abs(found.sigma - guesses) <= room)
 
 
@@ -224,7 +243,7 @@ def together(motion: Motion, centre: complex, radius: float, rough: bool = False
     noise = noise + np.abs(sigma)[:, None] ** np.arange(CIRCLE // 2 + 1, CIRCLE) @ out
     # Of a double zero the square of the distance is known.
     error = radius * np.minimum(noise / np.maximum(slopes, 1e-300), np.sqrt(2.0 * noise / np.maximum(curves, 1e-300)))
-    return Roots(centre + radius * sigma, error)
+    return Roots(centre + radius * sigma, error + EPS * (1.0 + np.abs(centre)))
 
 
 def zeros_near(motion: Motion, found: Modes, wanted: NDArray[np.bool_]) -> Roots:

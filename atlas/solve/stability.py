@@ -12,6 +12,7 @@ from towatlas.results_motion import Stability
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.growth import REMEDY, Spectrum, has_drag, reach_of
 from towatlas.solve.motion import TOGETHER, Motion, motions
+from towatlas.solve.positions import error_of, with_fish_moved
 from towatlas.system import System
 
 
@@ -99,25 +100,23 @@ def stability_of(found: Equilibria) -> Stability:
     >>> [str(kind) for kind in stability_of(equilibria(2.5, 0.0, 2.534)).kind]
     ['divergence', 'flutter', 'stable']
     """
-    count, system, speed = len(found), found.system, abs(found.gamma)
+    count, speed = len(found), abs(found.gamma)
     growth, frequency, error = (np.full(count, np.nan) for _ in range(3))
     unstable, index = np.full(count, -1), np.full(count, -1)
     codes = np.full(count, status.OK, np.int8)
     kinds, sigmas = ["unknown"] * count, [np.empty(0, np.complex128)] * count
     late: TooMuchWork | None = None
     with patience():
-        reach = reach_of(system, found.gamma)
         # In case the patience ends: the one that is expected to be seen, then those of few nodes, which are quick.
         order = sorted(range(count), key=lambda k: (k != found.expected, found.nodes[k]))
-        moved: dict[int, Motion] = {}
+        bodies: dict[int, tuple[Motion, Motion]] = {}
         for done, k in enumerate(order):
             try:
                 check_patience("growth rates of the shapes", REMEDY, done=done, of=count)
-                if k not in moved:
-                    some = order[done : done + TOGETHER]
-                    speeds, systems = np.full(len(some), found.gamma), np.tile(system.row(), (len(some), 1))
-                    moved = dict(zip(some, motions(found.r_f[some], speeds, systems, reach), strict=True))
-                answer = spectrum_of(found, k, moved[k])
+                if k not in bodies:
+                    bodies = bodies_of(found, order[done : done + TOGETHER])
+                answer = spectrum_of(found, k, bodies[k][0])
+                error[k] = error_of(answer.roots, *bodies[k], float(found.error[k])) * speed
             except TooMuchWork as reason:
                 codes[k], late = status.UNFINISHED, late or reason
                 continue
@@ -129,7 +128,6 @@ def stability_of(found: Equilibria) -> Stability:
             if len(roots):
                 sigmas[k] = roots.sigma * speed
                 growth[k], frequency[k] = sigmas[k][0].real, sigmas[k][0].imag
-                error[k] = max(roots.error[0], found.error[k]) * speed
     left = int((codes == status.UNFINISHED).sum())
     if late is not None and left == count:
         raise late
@@ -148,6 +146,26 @@ def stability_of(found: Equilibria) -> Stability:
         tuple(sigmas),
         scope,
     )
+
+
+def bodies_of(found: Equilibria, which: list[int]) -> dict[int, tuple[Motion, Motion]]:
+    """Small motions about some of the equilibria, and had their fish been a little farther out.
+
+    Parameters
+    ----------
+    found : Equilibria
+    which : list of int
+
+    Returns
+    -------
+    dict
+        By their numbers, two of each.
+    """
+    r_f, gamma = found.r_f[which], np.full(len(which), found.gamma)
+    systems = np.tile(found.system.row(), (len(which), 1))
+    bodies = motions(r_f, gamma, systems, reach_of(found.system, found.gamma))
+    moved = with_fish_moved(bodies, r_f, gamma, systems, found.error[which])
+    return dict(zip(which, zip(bodies, moved, strict=True), strict=True))
 
 
 def spectrum_of(found: Equilibria, k: int, motion: Motion | None = None) -> Spectrum:

@@ -35,6 +35,8 @@ def count_growing(motion: Motion, known: Complex) -> int | None:
     return None if count < 0 else count
 
 
+# Where D is 0 to the last bit on the contour, there is no count.
+@np.errstate(divide="ignore", invalid="ignore")
 def count_zeros(motions: Motions, known: Sequence[Complex], left: Array | None) -> Integers:
     """Zeros in the part of the disc |sigma| < reach with Re sigma > left, or without drag in all of it.
 
