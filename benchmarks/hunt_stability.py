@@ -18,7 +18,8 @@ from towatlas.results import Equilibria
 from towatlas.results_motion import Stability
 
 SEED = 7048
-SHAPES = 60
+SHAPES = 100
+CABLE = ("lam", "w_f", "gamma", "C", "w", "m_f", "C_t", "C_f", "C_s", "b_s")
 # Shapes of one cable that are looked at, at most.
 EACH = 2
 RTOL = 1e-12
@@ -33,13 +34,23 @@ class TooLongError(ArithmeticError):
 
 
 def draw(rng: Rng) -> dict[str, float]:
-    """A cable: w_f to 1e4, lam to 200, gamma to 20, C to 1e4, a third of them without drag, a sixth without a fish."""
-    return {
+    """A cable: w_f to 1e4, lam to 200, gamma to 20, C to 1e4, a third of them without drag, a sixth without a fish; to
+    half of them w to 0.05, C_t to 1, C_f to 10, |C_s| to 1 and b_s to 10."""
+    cable = {
         "lam": 10.0 ** rng.uniform(-0.5, np.log10(200.0)),
         "w_f": 0.0 if rng.random() < 1.0 / 6.0 else 10.0 ** rng.uniform(-3.0, 4.0),
         "gamma": 10.0 ** rng.uniform(-1.3, np.log10(20.0)),
         "C": 0.0 if rng.random() < 1.0 / 3.0 else 10.0 ** rng.uniform(-3.0, 4.0),
+        "w": 1.0,
     }
+    if rng.random() < 0.5:
+        cable["w"] = rng.uniform(0.05, 1.0)
+        cable["m_f"] = cable["w_f"] * rng.uniform(1.0, 3.0) if cable["w_f"] else 0.0
+        cable["C_t"] = 0.0 if rng.random() < 0.5 else 10.0 ** rng.uniform(-3.0, 0.0)
+        cable["C_f"] = 0.0 if rng.random() < 0.5 or not cable["w_f"] else 10.0 ** rng.uniform(-3.0, 1.0)
+        cable["C_s"] = rng.uniform(-1.0, 1.0)
+        cable["b_s"] = np.inf if rng.random() < 0.5 else 10.0 ** rng.uniform(-0.5, 1.0)
+    return cable
 
 
 def limited(march: Callable) -> Callable:
@@ -122,7 +133,7 @@ def summary(rows: list[dict[str, str]]) -> str:
     lines += ["beyond both the stated error and 1e-11:"] if beyond.any() else []
     lines += [
         f"  {compared[k]['off']}, stated {compared[k]['error']}: "
-        + ", ".join(f"{name} {float(compared[k][name]):.4g}" for name in ("lam", "w_f", "gamma", "C"))
+        + ", ".join(f"{name} {float(compared[k][name]):.4g}" for name in CABLE if name in compared[k])
         + f", {compared[k]['branch']}"
         for k in np.flatnonzero(beyond)
     ]

@@ -19,6 +19,8 @@ SPIN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 ONE = np.eye(3)
 SECANTS = 12
 CLOSE = 1e-14
+# Of complex steps, in which nothing cancels.
+STEP = 1e-30
 # Of extrapolation.
 COLUMNS = 8
 
@@ -36,6 +38,24 @@ def _drag(system: towatlas.System, g2: float, t: Array, V: Array) -> tuple[Array
     return -kappa * q * N - kappa_t * abs(along) * along * t, A, E
 
 
+def _side(system: towatlas.System, g2: float, t: Array, V: Array) -> Array:
+    """Side force on a length; rows of t and V for several."""
+    along, v2 = (V * t).sum(axis=-1, keepdims=True), (V * V).sum(axis=-1, keepdims=True)
+    across = ((V - along * t) ** 2).sum(axis=-1, keepdims=True) / v2
+    over = np.stack([t[..., i - 2] * V[..., i - 1] - t[..., i - 1] * V[..., i - 2] for i in range(3)], axis=-1)
+    return system.C_s / g2 * np.sqrt(v2) * over / (1.0 + across / system.b_s**2)
+
+
+def _with_side_force(system: towatlas.System, g2: float, t: Array, V: Array) -> tuple[Array, Array, Array]:
+    """As `_drag`; what the side force adds to the derivatives by complex steps."""
+    force, A, E = _drag(system, g2, t, V)
+    if not system.C_s or not V.any():
+        return force, A, E
+    by_turn, by_speed = t + STEP * 1j * np.eye(6, 3), V + STEP * 1j * np.eye(6, 3, -3)
+    side = _side(system, g2, by_turn, by_speed)
+    return force + side[0].real, A - side.imag[3:].T / STEP, E + side.imag[:3].T / STEP
+
+
 def _slopes(system: towatlas.System, g2: float, sigma: complex) -> Callable[[float, Array], Array]:
     turn = sigma * ONE + SPIN
     twice = turn @ turn
@@ -44,7 +64,7 @@ def _slopes(system: towatlas.System, g2: float, sigma: complex) -> Callable[[flo
         x, F, eta, phi = state[:3].real, state[3:6].real, state[6:15].reshape(3, 3), state[15:24].reshape(3, 3)
         T = np.sqrt(F @ F)
         t = F / T
-        force, A, E = _drag(system, g2, t, SPIN @ x)
+        force, A, E = _with_side_force(system, g2, t, SPIN @ x)
         slope = (phi - np.outer(t, t @ phi)) / T
         moved = E @ slope - (twice + A @ turn) @ eta
         pull = np.array([x[0], x[1], system.w]) + force

@@ -166,12 +166,16 @@ def test_what_is_known_is_told_where_the_patience_ends(monkeypatch):
             raise towatlas.TooMuchWork("over")
         return modes(motion, refined)
 
+    kinds = towatlas.stability_of(found).kind
     monkeypatch.setattr("towatlas.solve.growth.modes", some)
     monkeypatch.setattr("towatlas.solve.growth.count_growing", lambda motion, known: None)
     one = spectrum_of(found, 0)
     assert asked == [0, 1]
     assert (one.status, one.unstable) == (status.NOT_COUNTED, whole.unstable)
     assert one.roots.sigma[0] == whole.roots.sigma[0]
+    # Of what is not counted none is called stable, but what grows does so.
+    assert "stable" in kinds
+    assert [spectrum_of(found, k).kind for k in range(len(found))] == ["unknown" if k == "stable" else k for k in kinds]
     bodies = bodies_of(found, [0])[0]
     with towatlas.patience(1e-9):
         assert error_of(one.roots, *bodies, found.error[0]) == error_of(whole.roots, *bodies, found.error[0]) < 1e-12

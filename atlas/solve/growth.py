@@ -183,7 +183,8 @@ class Spectrum:
     def kind(self) -> str:
         """As of `towatlas.results.Stability`."""
         leading = complex(self.roots.sigma[0]) if len(self.roots) else 0j
-        return kind_of(self.unstable, leading, float(self.roots.error[0]) if len(self.roots) else 0.0)
+        counted = self.unstable if self.status == status.OK else -1
+        return kind_of(counted, leading, float(self.roots.error[0]) if len(self.roots) else 0.0)
 
     def _slowest(self, motion: Motion, guesses: Modes) -> Roots:
         """Where nothing grows: the slowest mode."""
