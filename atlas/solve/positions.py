@@ -13,8 +13,8 @@ from towatlas.kernels import status
 from towatlas.solve.motion import Array, Complex, Motion, Motions, motions
 from towatlas.solve.spectrum import Roots
 
-# Step of sigma over 1 + |sigma|; what a shot rounds counts as so much of r_f.
-STEP, ROUNDED = 1e-4, 4.0 * 2.0**-52
+# Step of sigma over 1 + |sigma|; what a step of a shot rounds counts as so much of r_f.
+STEP, ROUNDED = 1e-4, 2.0 * 2.0**-52
 
 
 def with_fish_moved(
@@ -37,8 +37,9 @@ def with_fish_moved(
         For `errors_with_fish`.
     """
     reach = np.array([body.reach for body in bodies])
+    rounded = ROUNDED * np.sqrt([len(body.sizes) for body in bodies])
     # No farther, though D is known to rounding only: some shapes are another's within a part in 1e10.
-    return motions(r_f * (1.0 + relative + ROUNDED), gamma, systems, reach, pool=pool)
+    return motions(r_f * (1.0 + relative + rounded), gamma, systems, reach, pool=pool)
 
 
 def errors_with_fish(

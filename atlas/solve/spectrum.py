@@ -27,8 +27,8 @@ VAGUE = 1e-6
 # First difference of secants, over sigma; errors over 1 + |sigma| that are left, with the rough Evans function and the
 # full one.
 FIRST_STEP, ROUGH, FINE = 1e-4, 1e-5, 32.0 * EPS
-# A determinant of solutions of unit length is known to rounding, times this a step.
-NOISE = 4.0
+# A determinant of solutions of unit length is known to rounding, times this a step: `benchmarks.growth_errors`.
+NOISE = 8.0
 # On the real axis: points between a share of the reach and all of it, and how often a change of sign is halved.
 LEAST, ALONG, HALVINGS = 1e-5, 48, 6
 
