@@ -237,3 +237,15 @@ def test_no_error_is_below_rounding():
     for k in range(len(found)):
         roots = spectrum_of(found, k).roots
         assert (roots.error >= np.finfo(float).eps * np.abs(roots.sigma)).all()
+
+
+def test_what_grows_by_less_than_its_error_is_unknown(monkeypatch):
+    """Where the last bits of r_f decide, whichever way growth rates are asked for."""
+    cable = {"lam": 37.8, "w_f": 1352.0, "C": 0.018}
+    before = towatlas.stability(gamma=5.94, **cable).kind.tolist()
+    assert set(before) == {"divergence", "flutter", "stable"}
+    after = ["stable" if kind == "stable" else "unknown" for kind in before]
+    monkeypatch.setattr("towatlas.solve.positions.errors_with_fish", lambda *_: np.array([1.0]))
+    monkeypatch.setattr("towatlas.solve.spectra.errors_with_fish", lambda *given: np.ones(len(given[2])))
+    assert towatlas.stability(gamma=5.94, **cable).kind.tolist() == after
+    assert towatlas.stability_many(gamma=[5.94], **cable).kind.values[0, : len(after)].tolist() == after

@@ -12,6 +12,7 @@ from towatlas.scene.jumps import SceneAnswer
 from towatlas.scene.models import system_of, with_drag
 from towatlas.scene.scene import MODELS, Scene, patient_with
 from towatlas.solve.equilibria import solve_equilibria
+from towatlas.solve.growth import kind_of
 from towatlas.solve.positions import error_of
 from towatlas.solve.stability import bodies_of, looked_at, spectrum_of
 
@@ -126,12 +127,12 @@ def verdict_of(scene: Scene, found: Equilibria, k: int) -> Verdict:
         return Verdict("unknown", nan, nan, nan, -1, status.NOT_COUNTED, str(reason))
     unit = abs(found.gamma) * rate_unit(scene)
     known = answer.status == status.OK
-    growth, frequency = nan, nan
+    leading, growth, frequency = 0j, nan, nan
     if len(answer.roots):
         leading = complex(answer.roots.sigma[0])
         growth, frequency = leading.real * unit, leading.imag * unit / (2.0 * pi)
     return Verdict(
-        kind=answer.kind,
+        kind=kind_of(answer.unstable if known else -1, leading, error),
         growth=growth,
         frequency=frequency,
         error=error * unit,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from towatlas.kernels import status
 from towatlas.kernels.system import C_F, C_S, C_T, LAM, C
-from towatlas.solve.growth import STILL, Spectrum, kind_of, reach_at
+from towatlas.solve.growth import STILL, Spectrum, reach_at
 from towatlas.solve.motion import Array, Complex, Integers, Motion, Motions, motions
 from towatlas.solve.spectrum import FINE, ROUGH, Function, Roots, noise_of, room_of, rough_zeros, secants
 from towatlas.solve.winding import count_zeros
@@ -65,7 +65,6 @@ class Answer:
     error: float
     unstable: int
     index: int
-    kind: str
     status: int
     zeros: Zeros | None
     motion: Motion | None
@@ -155,7 +154,7 @@ def _alone(spectrum: Spectrum, motion: Motion) -> Answer:
         sigma = np.concatenate([roots.sigma, near[apart > CLOSE]])
         nothing = np.full(len(sigma), np.nan + 0j)
         zeros = Zeros(sigma, nothing, nothing) if len(sigma) else None
-    return Answer(*leading, unstable, spectrum.index, spectrum.kind, spectrum.status, zeros, motion)
+    return Answer(*leading, unstable, spectrum.index, spectrum.status, zeros, motion)
 
 
 class _Followed:
@@ -286,8 +285,7 @@ class _Followed:
         if not self.drag and (index < 0 or unstable > index or (index - unstable) % 2):
             return None
         leading, error = complex(roots.sigma[0]), float(roots.error[0])
-        kind = kind_of(unstable, leading, error)
-        return Answer(leading, error, unstable, index, kind, status.OK, zeros, self.bodies[k])
+        return Answer(leading, error, unstable, index, status.OK, zeros, self.bodies[k])
 
 
 def _wanted(sigma: Complex, drag: bool) -> NDArray[np.bool_]:

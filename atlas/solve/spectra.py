@@ -11,7 +11,7 @@ from towatlas.effort import SECONDS, TooMuchWork, check_patience, patience
 from towatlas.kernels import status
 from towatlas.kernels.system import COLUMNS
 from towatlas.labelled import takes_frames
-from towatlas.solve.growth import REMEDY
+from towatlas.solve.growth import REMEDY, kind_of
 from towatlas.solve.many import equilibria_many
 from towatlas.solve.motion import Array, Integers
 from towatlas.solve.neighbours import Answer, Shapes, Zeros, solve_shapes
@@ -168,7 +168,7 @@ def _answers(shapes: Shapes, parents: list[Zeros | None], pool: ThreadPoolExecut
         return solve_shapes(shapes, parents, pool)
     except TooMuchWork:
         if len(parents) == 1:
-            return [Answer(complex(np.nan), np.nan, -1, -1, "unknown", status.STEP_LIMIT, None, None)]
+            return [Answer(complex(np.nan), np.nan, -1, -1, status.STEP_LIMIT, None, None)]
         halves = np.array_split(np.arange(len(parents)), 2)
         return [answer for half in halves for answer in _answers(shapes.part(half), [parents[k] for k in half], pool)]
 
@@ -187,9 +187,11 @@ def _errors_with_fish(shapes: Shapes, answers: list[Answer], relative: Array, po
 
 
 def _put(out: dict[str, NDArray[Any]], at: tuple[int, int], answer: Answer, speed: float, error: float) -> None:
+    """Error: what growth rates move by with the fish."""
     out["growth"][at], out["frequency"][at] = answer.sigma.real * speed, answer.sigma.imag * speed
     out["growth_error"][at] = (answer.error + error) * speed
-    for name in ("unstable", "index", "kind"):
+    out["kind"][at] = kind_of(answer.unstable, answer.sigma, answer.error + error)
+    for name in ("unstable", "index"):
         out[name][at] = getattr(answer, name)
     out["growth_status"][at] = answer.status
 

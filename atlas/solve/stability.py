@@ -10,7 +10,7 @@ from towatlas.kernels import status
 from towatlas.results import Equilibria
 from towatlas.results_motion import Stability
 from towatlas.solve.equilibria import solve_equilibria
-from towatlas.solve.growth import REMEDY, Spectrum, has_drag, reach_of
+from towatlas.solve.growth import REMEDY, Spectrum, has_drag, kind_of, reach_of
 from towatlas.solve.motion import TOGETHER, Motion, motions
 from towatlas.solve.positions import error_of, with_fish_moved
 from towatlas.system import System
@@ -122,9 +122,9 @@ def stability_of(found: Equilibria) -> Stability:
                 continue
             codes[k], index[k] = answer.status, answer.index
             roots = answer.roots
-            kinds[k] = answer.kind
             if codes[k] == status.OK:
                 unstable[k] = answer.unstable
+            kinds[k] = kind_of(unstable[k], complex(roots.sigma[0]) if len(roots) else 0j, error[k] / speed)
             if len(roots):
                 sigmas[k] = roots.sigma * speed
                 growth[k], frequency[k] = sigmas[k][0].real, sigmas[k][0].imag
