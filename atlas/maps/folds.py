@@ -80,10 +80,13 @@ def folds_around(data: xr.Dataset, cells: dict[str, Cell], system: System, low: 
 
 
 def _named(found: Folds, around: dict[str, NDArray[Any]]) -> Folds:
-    """Folds with the numbers on which all points around with as many of them agree, or else their own."""
-    count = len(found)
-    numbers = around["fold_n"][around["folds"] == count, :count].astype(np.int64)
-    if len(numbers) and (numbers == numbers[0]).all():
+    """Folds with the numbers on which all points around that have folds agree, or else their own.
+
+    Where some have more folds than others, the one that is left is here that of one pair, there that of another.
+    """
+    count, some = len(found), around["folds"] > 0
+    numbers = around["fold_n"][some, :count].astype(np.int64)
+    if len(numbers) and (around["folds"][some] == count).all() and (numbers == numbers[0]).all():
         return replace(found, n=numbers[0], origin=origin_of(numbers[0]))
     return name_folds(found)
 
