@@ -33,12 +33,13 @@ class Stability(Answer):
         growth the slowest. Without drag the growth of what does not grow is 0. nan where status says why, and where
         all is damped so strongly that none was found.
     unstable : ndarray of int, shape (equilibria,)
-        Number of eigenvalues that grow by more than their error, >= 0, conjugate ones counted each; -1 if not counted.
+        Number of eigenvalues that grow with the fish at r_f to the last bit, >= 0, conjugate ones counted each; -1 if
+        not counted.
     index : ndarray of int, shape (equilibria,)
         Without drag the number of directions in which the energy falls, >= 0; -1 with drag.
     kind : ndarray of str, shape (equilibria,)
         "stable"; "divergence" where the leading eigenvalue is real, "flutter" where it is one of a pair, "weak" where
-        it is below 0.01 gamma; "unknown" where not counted.
+        it is below 0.01 gamma; "unknown" where it grows by less than its error, or not all that grow were counted.
     error : ndarray, shape (equilibria,)
         Estimated absolute error of growth and frequency over sqrt(g/R) [-], > 0.
     status : ndarray of int8, shape (equilibria,)

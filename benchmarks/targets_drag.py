@@ -17,9 +17,9 @@ from benchmarks.samples_drag import FAMILIES, SAMPLES, arrays, shape_reference
 from benchmarks.targets import Target
 from benchmarks.timing import readable
 from towatlas.kernels import status
-from towatlas.solve.growth import Spectrum
 from towatlas.solve.jets import Jets, jets_of
 from towatlas.solve.shots import Array, direction_of, shoot
+from towatlas.solve.stability import spectrum_of
 
 MANY = 100_000
 # What the jets of a shot carry: the slope, and all that a fold is solved with.
@@ -137,8 +137,8 @@ def _evans(name: str, found: list[towatlas.Equilibria], calls: int = 20) -> Targ
     """The Evans function of each shape, one point alone."""
     times = []
     for one in found:
-        for r_f in one.r_f:
-            spectrum = Spectrum(one.system, one.gamma, float(r_f))
+        for k in range(len(one)):
+            spectrum = spectrum_of(one, k)
             motion, sigma = spectrum.motion(spectrum.reach), spectrum.roots.sigma[:1]
             motion.evans(sigma)
             used = min(_cpu(lambda m=motion, at=sigma: [m.evans(at) for _ in range(calls)]) for _ in range(5)) / calls

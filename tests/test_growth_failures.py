@@ -10,11 +10,12 @@ from test_stability import AIR, galerkin, motion_of
 import towatlas
 from benchmarks.stability import CASES, reference
 from towatlas.kernels import status
+from towatlas.scene.sweeps import sweep
+from towatlas.scene.verdicts import verdicts_of
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.galerkin import modes
-from towatlas.solve.growth import Spectrum
 from towatlas.solve.motion import BOUND, motions
-from towatlas.solve.positions import error_of
+from towatlas.solve.positions import errors_with_fish
 from towatlas.solve.spectrum import polish, together
 from towatlas.solve.stability import bodies_of, spectrum_of
 from towatlas.system import System
@@ -137,7 +138,7 @@ def test_slow_growth_beside_a_fold_where_drag_is_strong():
         growth = []
         for speed in gamma:
             shapes = solve_equilibria(system, speed)
-            spectra = [Spectrum(system, speed, r_f) for r_f in shapes.r_f]
+            spectra = [spectrum_of(shapes, k) for k in range(len(shapes))]
             assert [(one.status, one.unstable) for one in spectra] == [(0, 0), (0, 1), (0, 0)]
             growth.append(spectra[1].roots.sigma[0].real)
         assert growth[1] / growth[0] == pytest.approx(10.0, rel=0.05)
@@ -176,17 +177,17 @@ def test_what_is_known_is_told_where_the_patience_ends(monkeypatch):
     # Of what is not counted none is called stable, but what grows does so.
     assert "stable" in kinds
     assert [spectrum_of(found, k).kind for k in range(len(found))] == ["unknown" if k == "stable" else k for k in kinds]
-    bodies = bodies_of(found, [0])[0]
+    motion, moved = bodies_of(found, [0])[0]
     with towatlas.patience(1e-9):
-        assert error_of(one.roots, *bodies, found.error[0]) == error_of(whole.roots, *bodies, found.error[0]) < 1e-12
+        (move,) = errors_with_fish([motion], [moved], whole.roots.sigma[:1], found.error[:1])
+    assert one.error == whole.error == whole.roots.error[0] + move < 1e-12
 
 
 def leading_of(found, r_f):
     """The leading growth rate of the shape at r_f, and the error that is stated of it."""
     k = int(np.argmin(np.abs(found.r_f - r_f)))
-    motion, moved = bodies_of(found, [k])[k]
-    roots = spectrum_of(found, k, motion).roots
-    return k, roots.sigma[:1], error_of(roots, motion, moved, found.error[k])
+    one = spectrum_of(found, k)
+    return k, one.roots.sigma[:1], one.error
 
 
 def otherwise(found, k, zero, *, ulps, bound=BOUND):
@@ -241,11 +242,23 @@ def test_no_error_is_below_rounding():
 
 def test_what_grows_by_less_than_its_error_is_unknown(monkeypatch):
     """Where the last bits of r_f decide, whichever way growth rates are asked for."""
-    cable = {"lam": 37.8, "w_f": 1352.0, "C": 0.018}
-    before = towatlas.stability(gamma=5.94, **cable).kind.tolist()
-    assert set(before) == {"divergence", "flutter", "stable"}
-    after = ["stable" if kind == "stable" else "unknown" for kind in before]
-    monkeypatch.setattr("towatlas.solve.positions.errors_with_fish", lambda *_: np.array([1.0]))
-    monkeypatch.setattr("towatlas.solve.spectra.errors_with_fish", lambda *given: np.ones(len(given[2])))
-    assert towatlas.stability(gamma=5.94, **cable).kind.tolist() == after
-    assert towatlas.stability_many(gamma=[5.94], **cable).kind.values[0, : len(after)].tolist() == after
+    cable, scene = {"lam": 37.8, "w_f": 1352.0, "C": 0.018}, towatlas.read_scene("skop-fig3").at(gamma=5.94)
+
+    def ways():
+        yield towatlas.stability(gamma=5.94, **cable).kind
+        yield from towatlas.stability_many(gamma=[5.94, 5.95], **cable).kind.values
+        yield [shape.kind for shape in verdicts_of(towatlas.answer_scene(scene, model="air")).shapes]
+        yield from sweep(scene, speed=scene.speed * np.array([1.0, 1.001]), model="air", stability=True).kind.values[0]
+        branches = towatlas.diagram(gamma=(5.94, 5.95), **cable).branches
+        yield from zip(*(branch.kind[[0, -1]] for branch in branches[::-1]), strict=True)
+
+    def windows():
+        return towatlas.flutter(gamma=(5.94, 5.95), **cable).windows
+
+    before = [sorted(kinds) for kinds in ways()]
+    assert before == [["divergence", "flutter", "stable"]] * 8
+    assert windows()
+    for place in ("growth", "neighbours"):
+        monkeypatch.setattr(f"towatlas.solve.{place}.errors_with_fish", lambda *given: np.ones(len(given[2])))
+    assert [sorted(kinds) for kinds in ways()] == [["stable", "unknown", "unknown"]] * 8
+    assert not windows()

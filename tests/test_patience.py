@@ -400,7 +400,7 @@ def test_one_of_many_systems_is_given_up_and_the_others_are_as_without_it():
 def test_growth_rates_that_cannot_be_had_take_time_too():
     """A shape of too many steps has a status, and costs what they took: many such are no reason to go on."""
     system = System.of(10.0, 1.0)
-    lost = replace(Spectrum(system, 1.4, 0.5).motion(1.0), status=status.STEP_LIMIT)
-    assert Spectrum(system, 1.4, 0.5, motion=lost).status == status.STEP_LIMIT
+    lost = replace(Spectrum(system, 1.4, 0.5, 1e-15).motion(1.0), status=status.STEP_LIMIT)
+    assert Spectrum(system, 1.4, 0.5, 1e-15, bodies=(lost, lost)).status == status.STEP_LIMIT
     with patience(1e-9), pytest.raises(TooMuchWork, match="growth rates"):
-        Spectrum(system, 1.4, 0.5, motion=lost)
+        Spectrum(system, 1.4, 0.5, 1e-15, bodies=(lost, lost))

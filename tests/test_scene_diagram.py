@@ -20,6 +20,7 @@ from towatlas.scene.edges import flutter_edges
 from towatlas.scene.file import make_scene, read_scene
 from towatlas.scene.jumps import answer_scene
 from towatlas.scene.models import system_of
+from towatlas.scene.sweeps import sweep
 from towatlas.scene.verdicts import verdicts_of
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.flutter import flutter_of
@@ -185,7 +186,7 @@ class TestCommands:
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_no_answer_contradicts_another(seed):
-    """Random scenes in air and water: verdicts of scenes, windows of flutter, edges and the diagram."""
+    """Random scenes in air and water: verdicts of scenes, windows of flutter, edges, the diagram and a sweep."""
     rng = np.random.default_rng(seed)
     radius, water = float(10.0 ** rng.uniform(-1.0, 1.0)), bool(seed % 2)
     table = {
@@ -213,11 +214,17 @@ def test_no_answer_contradicts_another(seed):
     for edge in (edges.below, edges.above):
         if edge is not None and ends[0] < edge.speed < ends[1]:
             assert min(abs(edge.speed / value - 1.0) for value in points) < 1e-8
-    for speed in rng.uniform(*ends, 6):
+    speeds = np.sort(rng.uniform(*ends, 6))
+    curve = sweep(scene, speed=speeds, model=model, stability=True).isel(member=0)
+    for i, speed in enumerate(speeds):
         if min(abs(speed / value - 1.0) for value in points) < 2e-3:
             continue
         answer = answer_scene(scene.at(speed=float(speed)), model=model, asked=("nodes",))
         shapes, found = verdicts_of(answer).shapes, answer.equilibria
+        for j, k in enumerate(np.argsort(found.r_f)):
+            swept = curve.isel(value=i, shape=j)
+            assert swept.kind == shapes[k].kind
+            assert abs(swept.growth - shapes[k].growth) <= 2.0 * shapes[k].error
         there = [one for one in drawn.branches if one.points[0].value < speed < one.points[-1].value]
         assert len(there) == len(found)
         for branch in there:

@@ -1,7 +1,6 @@
 """Curves of a scene over its length or its speed, one for each of several scenes: all shapes, branches and jumps."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,13 +8,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from towatlas.checks import check_real
 from towatlas.effort import check_patience, patience
+from towatlas.kernels.system import LAM
 from towatlas.scene.choice import least_model
 from towatlas.scene.designs import DESIGN_QUESTIONS, with_length
 from towatlas.scene.models import system_of, with_drag
 from towatlas.scene.scene import MODELS, Scene, check_model, patient_with
 from towatlas.scene.verdicts import rate_unit
-from towatlas.solve.growth import Spectrum
 from towatlas.solve.shots import REMEDY
+from towatlas.solve.spectra import growth_columns, indices
 from towatlas.solve.sweeps import Swept, sweep_shapes
 
 if TYPE_CHECKING:
@@ -44,6 +44,8 @@ MOTION = {
     "growth": ("1/s", "growth of the leading eigenvalue"),
     "frequency": ("Hz", "frequency of the leading eigenvalue"),
 }
+# Of shapes that are not there.
+NONE = {"r_f": np.nan, "nodes": -1, "error": np.nan}
 MOST = 10**5
 
 
@@ -68,7 +70,7 @@ def sweep(
         stability in a fluid one with drag.
     stability : bool
         Whether each shape has its kind, as of `towatlas.results_motion.Stability`, growth [1/s] and frequency [Hz];
-        some hundredths of a second a shape.
+        some milliseconds a shape.
 
     Returns
     -------
@@ -145,20 +147,22 @@ def _at(scene: Scene, name: str, value: float) -> Scene:
 
 def _motion(scene: Scene, swept: Swept, name: str) -> dict[str, NDArray[Any]]:
     """Kind, growth and frequency of each shape."""
-    spectra, unit = [], rate_unit(scene)
-    for i, row in enumerate(swept.row):
-        check_patience("growth rates along the curve", REMEDY, done=i, of=len(swept.row))
-        value, r_f = float(swept.values[row]), float(swept.columns["r_f"][i])
-        system = replace(swept.system, lam=value) if name == "length" else swept.system
-        gamma = float(np.copysign(value, swept.gamma)) if name == "speed" else swept.gamma
-        spectra.append(Spectrum(system, gamma, r_f))
-    speeds = swept.values[swept.row] if name == "speed" else abs(swept.gamma)
-    leading = np.array([one.roots.sigma[0] if len(one.roots) else np.nan for one in spectra], np.complex128)
-    rates = leading * speeds * unit
+    place = swept.place
+    columns = {key: np.full((len(swept.values), place.max() + 1), none) for key, none in NONE.items()}
+    for key, column in columns.items():
+        column[swept.row, place] = swept.columns[key]
+    systems, gamma = np.tile(swept.system.row(), (len(swept.values), 1)), np.full(len(swept.values), swept.gamma)
+    if name == "length":
+        systems[:, LAM] = swept.values
+    else:
+        gamma = np.copysign(swept.values, gamma)
+    index = indices(systems, columns["r_f"], columns["nodes"])
+    found = growth_columns(systems, gamma, index=index, **columns)
+    unit = rate_unit(scene)
     return {
-        "kind": np.array([one.kind for one in spectra], np.str_),
-        "growth": rates.real,
-        "frequency": rates.imag / (2.0 * np.pi),
+        "kind": found["kind"][swept.row, place],
+        "growth": found["growth"][swept.row, place] * unit,
+        "frequency": found["frequency"][swept.row, place] * unit / (2.0 * np.pi),
     }
 
 
@@ -182,9 +186,8 @@ def _dataset(
     shapes, jump = np.zeros((len(members), count), np.int64), np.full((len(members), jumps), np.nan)
     change = np.zeros((len(members), jumps), np.int64)
     for k, (scene, (model, swept)) in enumerate(zip(members, curves, strict=True)):
-        counts = np.bincount(swept.row, minlength=count)
-        place = np.arange(len(swept.row)) - np.repeat(np.cumsum(counts) - counts, counts)
-        shapes[k] = counts
+        place = swept.place
+        shapes[k] = np.bincount(swept.row, minlength=count)
         jump[k, : len(swept.folds)] = swept.folds * (values[0] / swept.values[0])
         change[k, : len(swept.folds)] = swept.changes
         columns = _fields(scene, model, name, values, swept) | (motion[k] if motion else {})

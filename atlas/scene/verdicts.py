@@ -12,9 +12,7 @@ from towatlas.scene.jumps import SceneAnswer
 from towatlas.scene.models import system_of, with_drag
 from towatlas.scene.scene import MODELS, Scene, patient_with
 from towatlas.solve.equilibria import solve_equilibria
-from towatlas.solve.growth import kind_of
-from towatlas.solve.positions import error_of
-from towatlas.solve.stability import bodies_of, looked_at, spectrum_of
+from towatlas.solve.stability import looked_at, spectrum_of
 
 # Of the patience with a scene; the shapes themselves stand without.
 SHARE = 0.2
@@ -120,25 +118,18 @@ def verdict_of(scene: Scene, found: Equilibria, k: int) -> Verdict:
     Verdict
     """
     try:
-        motion, moved = bodies_of(found, [k])[k]
-        answer = spectrum_of(found, k, motion)
-        error = error_of(answer.roots, motion, moved, float(found.error[k]))
+        answer = spectrum_of(found, k)
     except (ArithmeticError, np.linalg.LinAlgError) as reason:
         return Verdict("unknown", nan, nan, nan, -1, status.NOT_COUNTED, str(reason))
     unit = abs(found.gamma) * rate_unit(scene)
-    known = answer.status == status.OK
-    leading, growth, frequency = 0j, nan, nan
-    if len(answer.roots):
-        leading = complex(answer.roots.sigma[0])
-        growth, frequency = leading.real * unit, leading.imag * unit / (2.0 * pi)
     return Verdict(
-        kind=kind_of(answer.unstable if known else -1, leading, error),
-        growth=growth,
-        frequency=frequency,
-        error=error * unit,
-        unstable=answer.unstable if known else -1,
+        kind=answer.kind,
+        growth=answer.leading.real * unit,
+        frequency=answer.leading.imag * unit / (2.0 * pi),
+        error=answer.error * unit,
+        unstable=answer.counted,
         code=answer.status,
-        reason="" if known else status.SENTENCES[answer.status],
+        reason="" if answer.status == status.OK else status.SENTENCES[answer.status],
     )
 
 

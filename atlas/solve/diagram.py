@@ -104,10 +104,7 @@ def _branch(
     t = np.array([sample.t for sample in samples])
     values, speeds = (np.array([of(one) for one in t]) for of in (follower.value, follower.speed))
     columns = _columns(follower, np.array([sample.x for sample in samples]), t)
-    unknown = complex(np.nan, np.nan)
-    leading = np.array(
-        [sample.spectrum.roots.sigma[0] if len(sample.spectrum.roots) else unknown for sample in samples]
-    )
+    leading = np.array([sample.spectrum.leading for sample in samples])
     kinds = np.array([sample.spectrum.kind for sample in samples], np.str_)
 
     def point(kind: str, at: float, fold: Fold | None = None) -> Point:

@@ -11,7 +11,7 @@ from towatlas.numerics.rows import EPS
 from towatlas.results import Equilibria
 from towatlas.solve.looks import SLOPE
 from towatlas.solve.search import FIRST_LOW, PREDICTED, Found, least_radius, search
-from towatlas.solve.shots import Array, Integers, shoot
+from towatlas.solve.shots import Array, Ends, Integers, shoot
 from towatlas.system import System
 
 ROUNDINGS = 16.0
@@ -95,8 +95,6 @@ def quantities(row: Integers, x: Array, systems: Array, gamma: Array) -> dict[st
     turned = np.arctan2(ends.Y[:, 0], ends.X[:, 0])
     cos, sin = np.cos(turned), np.sin(turned)
     fx, fy, tension = ends.FX[:, 0] / unit, ends.FY[:, 0] / unit, ends.T[:, 0] / unit
-    amplitude = np.hypot(1.0, np.hypot(fx, fy) / np.abs(gamma[row]) / np.sqrt(tension))
-    rounding = ROUNDINGS * EPS * amplitude * np.sqrt(1.0 + ends.steps)
     return {
         "R_x0": fx * cos + fy * sin,
         "R_y0": fy * cos - fx * sin,
@@ -110,9 +108,31 @@ def quantities(row: Integers, x: Array, systems: Array, gamma: Array) -> dict[st
         # x, the position towards the tow point, changes sign where the angle left is 90 degrees and every 180 more.
         "nodes": np.floor(ends.angle / np.pi + 0.5).astype(np.int64),
         "near_axis": (r / unit < NEAR_AXIS) & (np.diff(row, prepend=-1) != 0),
-        # Where the end of a shot moves far with the fish, the rounding of log r itself is what is left.
-        "error": np.maximum(rounding / np.abs(ends.log_rho[:, 1]), EPS * (1.0 + np.abs(x))),
+        "error": errors_of(x, ends, gamma[row]),
     }
+
+
+def errors_of(x: Array, ends: Ends, gamma: Array) -> Array:
+    """What rounding leaves of the radius of the fish.
+
+    Parameters
+    ----------
+    x : ndarray, shape (shapes,)
+        log of it over g / Omega^2.
+    ends : Ends
+        Of shots with slopes.
+    gamma : ndarray, shape (shapes,)
+
+    Returns
+    -------
+    ndarray, shape (shapes,)
+        Over that radius [-].
+    """
+    fx, fy, tension = (part[:, 0] / np.square(gamma) for part in (ends.FX, ends.FY, ends.T))
+    amplitude = np.hypot(1.0, np.hypot(fx, fy) / np.abs(gamma) / np.sqrt(tension))
+    rounding = ROUNDINGS * EPS * amplitude * np.sqrt(1.0 + ends.steps)
+    # Where the end of a shot moves far with the fish, the rounding of log r itself is what is left.
+    return np.asarray(np.maximum(rounding / np.abs(ends.log_rho[:, 1]), EPS * (1.0 + np.abs(x))))
 
 
 def fill(columns: dict[str, NDArray[Any]], row: Integers, rows: int) -> dict[str, NDArray[Any]]:

@@ -11,10 +11,12 @@ from towatlas.kernels import status
 from towatlas.kernels.system import LAM
 from towatlas.numerics.rows import EPS
 from towatlas.results_motion import Window
+from towatlas.solve.drag_equilibria import errors_of
 from towatlas.solve.growth import WEAK, Spectrum, has_drag, reach_of
 from towatlas.solve.looks import SLOPE
 from towatlas.solve.motion import Complex, Motion, motions
 from towatlas.solve.paths import Fold, Path, Trace, trace
+from towatlas.solve.positions import with_fish_moved
 from towatlas.solve.shots import Array
 from towatlas.solve.spectrum import CLOSE, polish, together
 from towatlas.system import System
@@ -47,6 +49,16 @@ class Sample:
     nodes: int
     place: int
     spectrum: Spectrum
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the growth rates of a shape are found from: its nodes, the error of the radius of its fish over that, and
+    small motions about it and by `with_fish_moved`."""
+
+    nodes: int
+    error: float
+    bodies: tuple[Motion, Motion]
 
 
 @dataclass(frozen=True)
@@ -127,11 +139,14 @@ class Follower:
         found = _places(traced)
         total, done = sum(len(places) for places in found), 0
         for places in found:
+            points = [(traced.columns[i].t, float(traced.columns[i].x[k]), k) for i, k in places]
             samples = []
-            for i, k in places:
-                check_patience("growth rates along the branches", REMEDY, done=done, of=total)
-                samples.append(self.sample(traced.columns[i].t, float(traced.columns[i].x[k]), k))
-                done += 1
+            for begin in range(0, len(points), AT_ONCE):
+                some = points[begin : begin + AT_ONCE]
+                for point, known in zip(some, self._bodies(some), strict=True):
+                    check_patience("growth rates along the branches", REMEDY, done=done, of=total)
+                    samples.append(self._sample(*point, known))
+                    done += 1
             yield samples, *_folds(traced, places)
 
     def through(
@@ -146,7 +161,7 @@ class Follower:
         points = self._points(traced, places)
         order = sorted(range(len(points)), key=lambda j: abs(points[j][0] - t))
         samples: dict[int, Sample] = {}
-        bodies: dict[int, tuple[int, Motion]] = {}
+        bodies: dict[int, Known] = {}
         for place, j in enumerate(order):
             way = [samples[m] for m in samples if (m - order[0]) * (j - order[0]) >= 0]
             if way and enough(way):
@@ -157,7 +172,7 @@ class Follower:
                     # Some at once: few shots leave lanes idle.
                     some = order[place : place + AT_ONCE]
                     bodies |= zip(some, self._bodies([points[m] for m in some]), strict=True)
-                samples[j] = self._sample(*points[j], *bodies[j])
+                samples[j] = self._sample(*points[j], bodies[j])
             except TooMuchWork:
                 if not samples:
                     raise
@@ -196,21 +211,25 @@ class Follower:
         return sorted(points)
 
     def sample(self, t: float, x: float, place: int) -> Sample:
-        return self._sample(t, x, place, *self._bodies([(t, x, place)])[0])
+        return self._sample(t, x, place, self._bodies([(t, x, place)])[0])
 
-    def _sample(self, t: float, x: float, place: int, nodes: int, motion: Motion) -> Sample:
+    def _sample(self, t: float, x: float, place: int, known: Known) -> Sample:
         r_f = float(np.exp(x) / self.speed(t) ** 2)
-        return Sample(t, x, nodes, place, Spectrum(self.system_at(t), self.speed(t), r_f, motion=motion))
+        spectrum = Spectrum(self.system_at(t), self.speed(t), r_f, known.error, bodies=known.bodies)
+        return Sample(t, x, known.nodes, place, spectrum)
 
-    def _bodies(self, points: list[tuple[float, float, int]]) -> list[tuple[int, Motion]]:
-        """Nodes and motions of shapes."""
+    def _bodies(self, points: list[tuple[float, float, int]]) -> list[Known]:
         t, x, _ = (np.array(column) for column in zip(*points, strict=True))
         ends = self.path.shots(x, t, SLOPE)
         nodes = np.floor(ends.angle / np.pi + 0.5).astype(int)
         systems, speeds = [self.system_at(one) for one in t], np.array([self.speed(one) for one in t])
         rows = np.stack([system.row() for system in systems])
         reach = np.array([reach_of(system, speed) for system, speed in zip(systems, speeds, strict=True)])
-        return list(zip(nodes.tolist(), motions(np.exp(x) / speeds**2, speeds, rows, reach), strict=True))
+        errors, r_f = errors_of(x, ends, speeds), np.exp(x) / speeds**2
+        bodies = motions(r_f, speeds, rows, reach)
+        moved = with_fish_moved(bodies, r_f, speeds, rows, errors)
+        pairs = zip(bodies, moved, strict=True)
+        return [Known(*of) for of in zip(nodes.tolist(), errors.tolist(), pairs, strict=True)]
 
     def between(self, a: Sample, b: Sample, t: float) -> Sample:
         """The shape of the branch of two samples at a speed between them."""

@@ -7,6 +7,7 @@ from towatlas.effort import TooMuchWork, check_patience
 from towatlas.kernels import status
 from towatlas.solve.galerkin import Modes, modes
 from towatlas.solve.motion import Array, Complex, Motion, motions
+from towatlas.solve.positions import errors_with_fish, with_fish_moved
 from towatlas.solve.spectrum import Roots, growing_real, zeros_near
 from towatlas.solve.winding import count_growing
 from towatlas.system import System
@@ -74,9 +75,9 @@ def kind_of(unstable: int, leading: complex, error: float) -> str:
     unstable : int
         How many growth rates grow; -1 if not counted.
     leading : complex
-        The leading one, in units of Omega.
+        The leading one, in units of Omega; nan where there is none.
     error : float
-        Its error.
+        Its error, with what it moves by as the fish does.
 
     Returns
     -------
@@ -116,10 +117,12 @@ class Spectrum:
         Speed [-].
     r_f : float
         Distance of the fish from the axis over tow radius [-], > 0.
+    relative : float
+        Error of r_f over r_f [-], > 0.
     index : int
         In a vacuum the number of directions in which the energy falls; -1 if not known.
-    motion : Motion, optional
-        That of the shape, for sigma up to `reach_of`, where it is known.
+    bodies : (Motion, Motion), optional
+        That of the shape, for sigma up to `reach_of`, and by `with_fish_moved`, where they are known.
 
     Attributes
     ----------
@@ -131,6 +134,8 @@ class Spectrum:
         Without drag as above.
     status : int
         A code of `towatlas.kernels.status`.
+    error : float
+        Of the leading root: its own, and by how much it moves as the fish does by its error; nan where there is none.
     guesses : Modes or None
         The last of Galerkin's method.
     rest : ndarray of complex, shape (modes,)
@@ -139,7 +144,15 @@ class Spectrum:
         As of `reach_of`.
     """
 
-    def __init__(self, system: System, gamma: float, r_f: float, index: int = -1, motion: Motion | None = None):
+    def __init__(
+        self,
+        system: System,
+        gamma: float,
+        r_f: float,
+        relative: float,
+        index: int = -1,
+        bodies: tuple[Motion, Motion] | None = None,
+    ):
         self.drag = has_drag(system)
         self.index = index
         self.roots = Roots(np.empty(0, np.complex128), np.empty(0))
@@ -149,10 +162,18 @@ class Spectrum:
         self.reach = reach_of(system, gamma)
         self.motion = lambda reach: motions(np.array([r_f]), np.array([gamma]), system.row()[None], reach)[0]
         check_patience("growth rates", REMEDY)
-        motion = motion or self.motion(self.reach)
-        self.status = motion.status
+        at = np.array([r_f]), np.array([gamma]), system.row()[None], np.array([relative])
+        motion = bodies[0] if bodies else self.motion(self.reach)
+        self.status, self.error = motion.status, np.nan
         if motion.status != status.OK:
             return
+        self._find(motion)
+        if len(self.roots):
+            moved = bodies[1] if bodies else with_fish_moved([motion], *at)[0]
+            move = errors_with_fish([motion], [moved], self.roots.sigma[:1], at[-1])
+            self.error = float(self.roots.error[0] + move[0])
+
+    def _find(self, motion: Motion) -> None:
         for refined in range(REFINEMENTS):
             try:
                 check_patience("growth rates", REMEDY)
@@ -174,17 +195,26 @@ class Spectrum:
             self.status, self.unstable = status.OK, 0
 
     @property
-    def growing(self) -> Complex:
-        """Those that grow, with frequencies >= 0, where they were counted."""
-        sigma = self.roots.sigma
-        return sigma[sigma.real > np.maximum(self.roots.error, STILL)] if self.unstable > 0 else sigma[:0]
+    def leading(self) -> complex:
+        """The leading root, nan where there is none."""
+        return complex(self.roots.sigma[0]) if len(self.roots) else complex(np.nan, np.nan)
+
+    @property
+    def counted(self) -> int:
+        """How many grow, -1 where that is not all of them."""
+        return self.unstable if self.status == status.OK else -1
 
     @property
     def kind(self) -> str:
-        """As of `towatlas.results.Stability`."""
-        leading = complex(self.roots.sigma[0]) if len(self.roots) else 0j
-        counted = self.unstable if self.status == status.OK else -1
-        return kind_of(counted, leading, float(self.roots.error[0]) if len(self.roots) else 0.0)
+        """As of `towatlas.results_motion.Stability`."""
+        return kind_of(self.counted, self.leading, self.error)
+
+    @property
+    def growing(self) -> Complex:
+        """Those that grow, with frequencies >= 0, where they were counted and the leading one is known to."""
+        sigma = self.roots.sigma
+        known = self.unstable > 0 and self.kind != "unknown"
+        return sigma[sigma.real > np.maximum(self.roots.error, STILL)] if known else sigma[:0]
 
     def _slowest(self, motion: Motion, guesses: Modes) -> Roots:
         """Where nothing grows: the slowest mode."""

@@ -9,7 +9,7 @@ own `Spectrum`, as the first one has.
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from contextvars import copy_context
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from towatlas.kernels import status
 from towatlas.kernels.system import C_F, C_S, C_T, LAM, C
 from towatlas.solve.growth import STILL, Spectrum, reach_at
 from towatlas.solve.motion import Array, Complex, Integers, Motion, Motions, motions
+from towatlas.solve.positions import errors_with_fish, with_fish_moved
 from towatlas.solve.spectrum import FINE, ROUGH, Function, Roots, noise_of, room_of, rough_zeros, secants
 from towatlas.solve.winding import count_zeros
 from towatlas.system import System
@@ -58,8 +59,8 @@ class Zeros:
 
 @dataclass(frozen=True)
 class Answer:
-    """Of one shape: its leading growth rate and its error as a zero of D, in units of Omega, nan where there is none,
-    and the rest as of `Spectrum`; with zeros for its neighbours, and its motion."""
+    """Of one shape: its leading growth rate and the error of it, in units of Omega, nan where there is none, and the
+    rest as of `Spectrum`; with zeros for its neighbours."""
 
     sigma: complex
     error: float
@@ -67,7 +68,6 @@ class Answer:
     index: int
     status: int
     zeros: Zeros | None
-    motion: Motion | None
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,8 @@ class Shapes:
     Attributes
     ----------
     systems : ndarray, shape (shapes, columns)
-    gamma, r_f : ndarray, shape (shapes,)
-        Speeds, and distances of the fish from the axis over tow radius [-].
+    gamma, r_f, relative : ndarray, shape (shapes,)
+        Speeds, distances of the fish from the axis over tow radius, and errors of these over them [-].
     index : ndarray of int, shape (shapes,)
         As of `Spectrum`.
     """
@@ -86,16 +86,21 @@ class Shapes:
     systems: Array
     gamma: Array
     r_f: Array
+    relative: Array
     index: Integers
 
     def part(self, which: NDArray) -> "Shapes":
         """Some of them."""
-        return Shapes(self.systems[which], self.gamma[which], self.r_f[which], self.index[which])
+        return Shapes(*(of[which] for of in (self.systems, self.gamma, self.r_f, self.relative, self.index)))
 
     @property
     def drag(self) -> NDArray[np.bool_]:
         """Whether the fluid does work on motions."""
         return np.asarray((self.systems[:, [C, C_F, C_T, C_S]] != 0.0).any(axis=1))
+
+    def with_fish_moved(self, bodies: Sequence[Motion], pool: Executor) -> list[Motion]:
+        """As `towatlas.solve.positions.with_fish_moved`."""
+        return with_fish_moved(bodies, self.r_f, self.gamma, self.systems, self.relative, pool)
 
 
 def solve_shapes(shapes: Shapes, parents: Sequence[Zeros | None], pool: Executor) -> list[Answer]:
@@ -126,12 +131,12 @@ def solve_shapes(shapes: Shapes, parents: Sequence[Zeros | None], pool: Executor
         some_rest = shapes.part(rest)
         reach = reach_at(lam=some_rest.systems[:, LAM], gamma=some_rest.gamma, drag=some_rest.drag)
         bodies = motions(some_rest.r_f, some_rest.gamma, some_rest.systems, reach, pool=pool)
+        moved = some_rest.with_fish_moved(bodies, pool)
 
         def alone(k: int) -> Answer:
             system, index = System(*(float(value) for value in some_rest.systems[k])), int(some_rest.index[k])
-            return _alone(
-                Spectrum(system, float(some_rest.gamma[k]), float(some_rest.r_f[k]), index, bodies[k]), bodies[k]
-            )
+            gamma, r_f, relative = (float(of[k]) for of in (some_rest.gamma, some_rest.r_f, some_rest.relative))
+            return _alone(Spectrum(system, gamma, r_f, relative, index, (bodies[k], moved[k])))
 
         # With the patience of the caller.
         contexts = [copy_context() for _ in rest]
@@ -140,11 +145,9 @@ def solve_shapes(shapes: Shapes, parents: Sequence[Zeros | None], pool: Executor
     return [answer for answer in found if answer is not None]
 
 
-def _alone(spectrum: Spectrum, motion: Motion) -> Answer:
+def _alone(spectrum: Spectrum) -> Answer:
     """Of a shape by itself."""
     roots, guesses = spectrum.roots, spectrum.guesses
-    leading = (complex(roots.sigma[0]), float(roots.error[0])) if len(roots) else (complex(np.nan), np.nan)
-    unstable = spectrum.unstable if spectrum.status == status.OK else -1
     zeros = None
     if spectrum.status == status.OK and guesses is not None:
         near = guesses.sigma[np.abs(guesses.sigma) < FOLLOWED * spectrum.reach]
@@ -154,7 +157,7 @@ def _alone(spectrum: Spectrum, motion: Motion) -> Answer:
         sigma = np.concatenate([roots.sigma, near[apart > CLOSE]])
         nothing = np.full(len(sigma), np.nan + 0j)
         zeros = Zeros(sigma, nothing, nothing) if len(sigma) else None
-    return Answer(*leading, unstable, spectrum.index, spectrum.status, zeros, motion)
+    return Answer(spectrum.leading, spectrum.error, spectrum.counted, spectrum.index, spectrum.status, zeros)
 
 
 class _Followed:
@@ -173,7 +176,7 @@ class _Followed:
         )
         sound = [body.status == status.OK and body.fastest_flow <= 1.0 for body in self.bodies]
         self.which = np.flatnonzero(sound)
-        self.index, self.parents = shapes.index, parents
+        self.shapes, self.parents = shapes, parents
 
     def answers(self) -> list[Answer | None]:
         """None where they were not found, or are not all."""
@@ -200,7 +203,18 @@ class _Followed:
         for k, roots in zip(whole, self._leading([zeros[i] for i in whole], whole), strict=True):
             if roots is not None:
                 found[self.which[k]] = self._answer(self.which[k], roots, zeros[k])
-        return found
+        return self._with_errors(found)
+
+    def _with_errors(self, found: list[Answer | None]) -> list[Answer | None]:
+        """With what leading ones move by as the fish does."""
+        which = [k for k, answer in enumerate(found) if answer is not None]
+        if not which:
+            return found
+        shapes, bodies = self.shapes.part(np.array(which)), [self.bodies[k] for k in which]
+        sigma = np.array([answer.sigma for answer in found if answer is not None])
+        moved = shapes.with_fish_moved(bodies, self.pool)
+        moves = dict(zip(which, errors_with_fish(bodies, moved, sigma, shapes.relative, self.pool), strict=True))
+        return [answer and replace(answer, error=answer.error + moves[k]) for k, answer in enumerate(found)]
 
     def _function(self, owner: Integers, which: Integers, rough: bool) -> tuple[Function, Array]:
         """D over its value at the reach, of points of shapes; and the logarithms that it had last over those of D."""
@@ -281,11 +295,11 @@ class _Followed:
     def _answer(self, k: int, roots: Roots, zeros: Zeros) -> Answer | None:
         grows = (roots.sigma.real > np.maximum(roots.error, STILL)) & (np.abs(roots.sigma) < self.bodies[k].reach)
         unstable = int(np.where(roots.sigma[grows].imag == 0.0, 1, 2).sum())
-        index = int(self.index[k])
+        index = int(self.shapes.index[k])
         if not self.drag and (index < 0 or unstable > index or (index - unstable) % 2):
             return None
         leading, error = complex(roots.sigma[0]), float(roots.error[0])
-        return Answer(leading, error, unstable, index, status.OK, zeros, self.bodies[k])
+        return Answer(leading, error, unstable, index, status.OK, zeros)
 
 
 def _wanted(sigma: Complex, drag: bool) -> NDArray[np.bool_]:

@@ -11,7 +11,6 @@ import numpy as np
 from towatlas.effort import to_the_end
 from towatlas.kernels import status
 from towatlas.solve.motion import Array, Complex, Motion, Motions, motions
-from towatlas.solve.spectrum import Roots
 
 # Step of sigma over 1 + |sigma|; what a step of a shot rounds counts as so much of r_f.
 STEP, ROUNDED = 1e-4, 2.0 * 2.0**-52
@@ -83,25 +82,3 @@ def errors_with_fish(
         errors = np.fmin(change / slope, np.sqrt(2.0 * change / curve))
     sound = np.array([motion.status == status.OK for motion in moved])
     return np.where(sound & np.isfinite(errors), np.maximum(errors, relative), np.inf)
-
-
-def error_of(roots: Roots, body: Motion, moved: Motion, relative: float) -> float:
-    """Error of the leading growth rate of a shape.
-
-    Parameters
-    ----------
-    roots : Roots
-        The leading one first.
-    body, moved : Motion
-        About the shape, and by `with_fish_moved`.
-    relative : float
-        Error of r_f over r_f [-], > 0.
-
-    Returns
-    -------
-    float
-        In units of Omega; nan where there are no roots.
-    """
-    if not len(roots):
-        return float("nan")
-    return float(roots.error[0] + errors_with_fish([body], [moved], roots.sigma[:1], np.array([relative]))[0])

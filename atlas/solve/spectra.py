@@ -15,7 +15,6 @@ from towatlas.solve.growth import REMEDY, kind_of
 from towatlas.solve.many import equilibria_many
 from towatlas.solve.motion import Array, Integers
 from towatlas.solve.neighbours import Answer, Shapes, Zeros, solve_shapes
-from towatlas.solve.positions import errors_with_fish, with_fish_moved
 from towatlas.system import System
 
 if TYPE_CHECKING:
@@ -86,7 +85,7 @@ def stability_many(
         shape = found.r_f.shape
         systems = np.stack([found[name].values.ravel() for name in COLUMNS], axis=1)
         flat = {name: found[name].values.reshape(-1, shape[-1]) for name in ("r_f", "nodes", "error")}
-        index = _indices(systems, flat["r_f"], flat["nodes"])
+        index = indices(systems, flat["r_f"], flat["nodes"])
         columns = growth_columns(systems, found.gamma.values.ravel(), index=index, **flat)
     variables: dict[str, Any] = {
         name: (found.r_f.dims, columns[name].reshape(shape), {"long_name": text, "units": "1"})
@@ -150,11 +149,9 @@ def growth_columns(
                         _parent(known.get(int(a) - 1, []), int(nodes[a, b]), int(index[a, b]), float(r_f[a, b]))
                         for a, b in zip(i, k, strict=True)
                     ]
-                    shapes = Shapes(systems[i], gamma[i], r_f[i, k], index[i, k])
-                    answers = _answers(shapes, parents, pool)
-                    moves = _errors_with_fish(shapes, answers, error[i, k], pool)
-                    for a, b, answer, move in zip(i, k, answers, moves, strict=True):
-                        _put(out, (a, b), answer, abs(gamma[a]), move)
+                    shapes = Shapes(systems[i], gamma[i], r_f[i, k], error[i, k], index[i, k])
+                    for a, b, answer in zip(i, k, _answers(shapes, parents, pool), strict=True):
+                        _put(out, (a, b), answer, abs(gamma[a]))
                         if answer.zeros is not None:
                             mine = known.setdefault(int(a), [])
                             mine.append((int(nodes[a, b]), int(index[a, b]), float(r_f[a, b]), answer.zeros))
@@ -168,29 +165,15 @@ def _answers(shapes: Shapes, parents: list[Zeros | None], pool: ThreadPoolExecut
         return solve_shapes(shapes, parents, pool)
     except TooMuchWork:
         if len(parents) == 1:
-            return [Answer(complex(np.nan), np.nan, -1, -1, status.STEP_LIMIT, None, None)]
+            return [Answer(complex(np.nan), np.nan, -1, -1, status.STEP_LIMIT, None)]
         halves = np.array_split(np.arange(len(parents)), 2)
         return [answer for half in halves for answer in _answers(shapes.part(half), [parents[k] for k in half], pool)]
 
 
-def _errors_with_fish(shapes: Shapes, answers: list[Answer], relative: Array, pool: ThreadPoolExecutor) -> Array:
-    """Of the leading growth rates, nan where there are none."""
-    errors = np.full(len(answers), np.nan)
-    which = np.array([k for k, answer in enumerate(answers) if np.isfinite(answer.sigma)], np.int64)
-    if not len(which):
-        return errors
-    bodies = [motion for k in which if (motion := answers[k].motion) is not None]
-    some, sigma = shapes.part(which), np.array([answers[k].sigma for k in which], np.complex128)
-    moved = with_fish_moved(bodies, some.r_f, some.gamma, some.systems, relative[which], pool)
-    errors[which] = errors_with_fish(bodies, moved, sigma, relative[which], pool)
-    return errors
-
-
-def _put(out: dict[str, NDArray[Any]], at: tuple[int, int], answer: Answer, speed: float, error: float) -> None:
-    """Error: what growth rates move by with the fish."""
+def _put(out: dict[str, NDArray[Any]], at: tuple[int, int], answer: Answer, speed: float) -> None:
     out["growth"][at], out["frequency"][at] = answer.sigma.real * speed, answer.sigma.imag * speed
-    out["growth_error"][at] = (answer.error + error) * speed
-    out["kind"][at] = kind_of(answer.unstable, answer.sigma, answer.error + error)
+    out["growth_error"][at] = answer.error * speed
+    out["kind"][at] = kind_of(answer.unstable, answer.sigma, answer.error)
     for name in ("unstable", "index"):
         out[name][at] = getattr(answer, name)
     out["growth_status"][at] = answer.status
@@ -202,9 +185,23 @@ def _parent(of: list[tuple[int, int, float, Zeros]], nodes: int, index: int, r_f
     return min(alike, key=lambda pair: pair[0])[1] if alike else None
 
 
-def _indices(systems: Array, r_f: Array, nodes: Integers) -> Integers:
-    """Directions in which the energy of shapes in a vacuum falls: of two with the same nodes the outer one is that
-    farther from the axis; -1 in any other medium, and where there are not two of them."""
+def indices(systems: Array, r_f: Array, nodes: Integers) -> Integers:
+    """Directions in which the energy of shapes in a vacuum falls.
+
+    Parameters
+    ----------
+    systems : ndarray, shape (systems, columns)
+        As of `System.row`.
+    r_f : ndarray, shape (systems, shapes)
+        Distances of the fish from the axis over tow radius [-], nan where there is no shape.
+    nodes : ndarray of int, shape (systems, shapes)
+
+    Returns
+    -------
+    ndarray of int, shape (systems, shapes)
+        Of two with the same nodes the outer one is that farther from the axis; -1 in any other medium, and where there
+        are not two of them.
+    """
     index = np.full(r_f.shape, -1)
     for i, row in enumerate(systems):
         if not System(*(float(value) for value in row)).in_vacuum:

@@ -10,9 +10,9 @@ from towatlas.kernels import status
 from towatlas.results import Equilibria
 from towatlas.results_motion import Stability
 from towatlas.solve.equilibria import solve_equilibria
-from towatlas.solve.growth import REMEDY, Spectrum, has_drag, kind_of, reach_of
+from towatlas.solve.growth import REMEDY, Spectrum, has_drag, reach_of
 from towatlas.solve.motion import TOGETHER, Motion, motions
-from towatlas.solve.positions import error_of, with_fish_moved
+from towatlas.solve.positions import with_fish_moved
 from towatlas.system import System
 
 
@@ -115,19 +115,13 @@ def stability_of(found: Equilibria) -> Stability:
                 check_patience("growth rates of the shapes", REMEDY, done=done, of=count)
                 if k not in bodies:
                     bodies = bodies_of(found, order[done : done + TOGETHER])
-                answer = spectrum_of(found, k, bodies[k][0])
-                error[k] = error_of(answer.roots, *bodies[k], float(found.error[k])) * speed
+                answer = spectrum_of(found, k, bodies[k])
             except TooMuchWork as reason:
                 codes[k], late = status.UNFINISHED, late or reason
                 continue
-            codes[k], index[k] = answer.status, answer.index
-            roots = answer.roots
-            if codes[k] == status.OK:
-                unstable[k] = answer.unstable
-            kinds[k] = kind_of(unstable[k], complex(roots.sigma[0]) if len(roots) else 0j, error[k] / speed)
-            if len(roots):
-                sigmas[k] = roots.sigma * speed
-                growth[k], frequency[k] = sigmas[k][0].real, sigmas[k][0].imag
+            codes[k], index[k], kinds[k], unstable[k] = answer.status, answer.index, answer.kind, answer.counted
+            sigmas[k], error[k] = answer.roots.sigma * speed, answer.error * speed
+            growth[k], frequency[k] = answer.leading.real * speed, answer.leading.imag * speed
     left = int((codes == status.UNFINISHED).sum())
     if late is not None and left == count:
         raise late
@@ -168,7 +162,7 @@ def bodies_of(found: Equilibria, which: list[int]) -> dict[int, tuple[Motion, Mo
     return dict(zip(which, zip(bodies, moved, strict=True), strict=True))
 
 
-def spectrum_of(found: Equilibria, k: int, motion: Motion | None = None) -> Spectrum:
+def spectrum_of(found: Equilibria, k: int, bodies: tuple[Motion, Motion] | None = None) -> Spectrum:
     """Growth rates of one of some equilibria.
 
     Parameters
@@ -176,8 +170,8 @@ def spectrum_of(found: Equilibria, k: int, motion: Motion | None = None) -> Spec
     found : Equilibria
     k : int
         Which.
-    motion : Motion, optional
-        Its linearised motion, where it is known.
+    bodies : (Motion, Motion), optional
+        Those of `bodies_of`, where they are known.
 
     Returns
     -------
@@ -189,7 +183,7 @@ def spectrum_of(found: Equilibria, k: int, motion: Motion | None = None) -> Spec
         As `stability_of`.
     """
     energy = index_of(str(found.branch[k])) if found.system.in_vacuum else -1
-    return Spectrum(found.system, found.gamma, float(found.r_f[k]), energy, motion)
+    return Spectrum(found.system, found.gamma, float(found.r_f[k]), float(found.error[k]), energy, bodies)
 
 
 def looked_at(found: Equilibria) -> str:

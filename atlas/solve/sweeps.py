@@ -53,6 +53,12 @@ class Swept:
     changes: Integers
     complete: bool
 
+    @property
+    def place(self) -> Integers:
+        """Number of each shape among those of its value."""
+        counts = np.bincount(self.row, minlength=len(self.values))
+        return np.arange(len(self.row)) - np.repeat(np.cumsum(counts) - counts, counts)
+
 
 def sweep_shapes(system: System, gamma: float, name: str, values: Array) -> Swept:
     """All shapes at values of the length or the speed; no checks.

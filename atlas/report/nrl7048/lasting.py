@@ -15,11 +15,11 @@ from towatlas.results import Array, Equilibria
 from towatlas.results_motion import Window
 from towatlas.solve.equilibria import equilibria
 from towatlas.solve.follower import Follower
-from towatlas.solve.growth import Spectrum, reach_of
+from towatlas.solve.growth import reach_of
 from towatlas.solve.motion import motions
 from towatlas.solve.paths import Path, trace
 from towatlas.solve.spectrum import polish
-from towatlas.solve.stability import index_of
+from towatlas.solve.stability import spectrum_of
 from towatlas.system import System
 
 # Speeds at which growth is counted are no further apart than this part of them; from so far below the slowest
@@ -144,9 +144,8 @@ def seen(case: Case, branch: str = "") -> Seen:
     check_patience("growth rates of the page", REMEDY)
     found = shapes(case)
     k = list(found.branch).index(branch) if branch else found.expected
-    index = index_of(str(found.branch[k])) if found.system.in_vacuum else -1
-    spectrum = Spectrum(found.system, case.gamma, float(found.r_f[k]), index)
-    sigma = spectrum.roots.sigma[0] * case.gamma if len(spectrum.roots) else complex(nan, nan)
+    spectrum = spectrum_of(found, k)
+    sigma = spectrum.leading * case.gamma
     turns = case.gamma / (2.0 * pi * sigma.real) if sigma.real > 0.0 else nan
     return Seen(int(found.nodes[k]), spectrum.kind, float(sigma.real), float(sigma.imag), turns)
 
