@@ -22,7 +22,7 @@ SHAPES = 100
 CABLE = ("lam", "w_f", "gamma", "C", "w", "m_f", "C_t", "C_f", "C_s", "b_s")
 # Shapes of one cable that are looked at, at most.
 EACH = 2
-RTOL = 1e-12
+RTOL, PIECES = 1e-12, 50
 # Slopes that the other program may ask for, for one growth rate: some seconds.
 MOST = 100_000
 
@@ -78,9 +78,10 @@ def off(found: Stability, k: int) -> tuple[float, str]:
     if shapes.system.w_f == 0.0:
         return np.nan, "no fish"
     sigma = found.eigenvalues[k][0] / abs(shapes.gamma)
+    march = peers.orthonormal(limited(peers.by_scipy("DOP853", RTOL)), PIECES)
     try:
         with np.errstate(all="ignore"):
-            other = peers.by_secants(shapes, k, sigma * (1.0 + 1e-6), limited(peers.by_scipy("DOP853", RTOL)))
+            other = peers.by_secants(shapes, k, sigma * (1.0 + 1e-6), march)
     except TooLongError:
         return np.nan, "too long"
     return abs(other - sigma), "" if np.isfinite(other) else "lost"

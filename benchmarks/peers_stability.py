@@ -160,6 +160,22 @@ def by_scipy(method: str, rtol: float) -> Callable:
     return march
 
 
+def orthonormal(march: Callable, pieces: int) -> Callable:
+    """A march in so many pieces, each from motions that are made orthonormal: on a long cable those that grow fastest
+    hide the others, and with them the zero of D, which is the same."""
+
+    def marched(slopes: Callable, length: float, start: Array) -> Array:
+        state = start
+        for _ in range(pieces):
+            state = march(slopes, length / pieces, state)
+            basis, factors = np.linalg.qr(state[6:].reshape(6, 3))
+            turns = np.diag(factors) / np.abs(np.diag(factors))
+            state = np.concatenate([state[:6], (basis * turns).ravel()])
+        return state
+
+    return marched
+
+
 def by_rk4(segments: int) -> Callable:
     """A march by Runge-Kutta in equal steps of the arc length."""
 

@@ -155,6 +155,19 @@ def test_zeros_of_a_large_circle_that_are_none():
     assert np.abs(growing[:2] - np.array([0.163545702 + 0.655993436j, 0.120420147 + 1.578231081j])).max() < 1e-8
 
 
+@pytest.mark.parametrize("place", [3.213, -0.0014 + 1.1958j, -0.0085 + 1.1262j])
+def test_what_is_past_the_end_of_a_series_is_in_its_errors(place):
+    """On circles that are large for a long cable it is seen at all orders: 9e-12 where 6e-14 was stated."""
+    fluid = {"C": 0.009835190918226714, "w": 0.6119837409593795, "C_s": 0.7880694034451916}
+    system = System.of(52.146415435863716, 0.0013356419248066562, **fluid)
+    gamma, r_f = np.array([9.834810210522589]), np.array([1.5455044590291505])
+    (motion,) = motions(r_f, gamma, system.row()[None], 4.0)
+    some = together(motion, place, 0.07 if place.imag else 0.04)
+    roots, found = polish(motion, some.sigma, some.sigma)
+    assert found.any()
+    assert (np.abs(roots.sigma - some.sigma) <= some.error + roots.error)[found].all()
+
+
 def test_what_is_known_is_told_where_the_patience_ends(monkeypatch):
     """Of a shape whose growth rates are not counted yet."""
     found = towatlas.equilibria(6.0, 2.0, 1.5, C=0.3)

@@ -22,8 +22,12 @@ FAR, OF_THE_WAY = 0.1, 0.4
 CLOSE, CIRCLE = 0.02, 32
 # Of the zeros of a series on that circle, those within this part of it are right.
 INSIDE = 0.6
-# Zeros on a circle with larger errors are looked for by secants from there; double ones have smaller ones.
-VAGUE = 1e-6
+# Zeros on a circle with errors beyond the first, over 1 + |sigma|, are looked for by secants from there; what these do
+# not find, as double zeros, is kept where its error is less than the second.
+SURE, VAGUE = 1e-12, 1e-6
+# What is past the end of a series, which values on the circle show at lower orders, is less than the largest of so many
+# of its last coefficients.
+LAST = 3
 # First difference of secants, over sigma; errors over 1 + |sigma| that are left, with the rough Evans function and the
 # full one.
 FIRST_STEP, ROUGH, FINE = 1e-4, 1e-5, 32.0 * EPS
@@ -239,7 +243,7 @@ def together(motion: Motion, centre: complex, radius: float, rough: bool = False
     sigma = np.roots(series.real if complex(centre).imag == 0.0 else series)
     sigma = sigma[np.abs(sigma) < INSIDE]
     slopes, curves = (np.abs(np.polyval(np.polyder(series, order), sigma)) for order in (1, 2))
-    noise = (ROUGH if rough else NOISE * EPS * np.sqrt(len(motion.sizes))) * np.abs(series).max()
+    noise = (ROUGH if rough else NOISE * EPS * np.sqrt(len(motion.sizes))) * np.abs(series).max() + out[-LAST:].max()
     noise = noise + np.abs(sigma)[:, None] ** np.arange(CIRCLE // 2 + 1, CIRCLE) @ out
     # Of a double zero the square of the distance is known.
     error = radius * np.minimum(noise / np.maximum(slopes, 1e-300), np.sqrt(2.0 * noise / np.maximum(curves, 1e-300)))
@@ -272,13 +276,15 @@ def zeros_near(motion: Motion, found: Modes, wanted: NDArray[np.bool_]) -> Roots
 
 
 def _sharpened(motion: Motion, some: Roots) -> Roots:
-    """Zeros from a circle; those that its series tells badly by secants, or left out."""
-    vague = some.error > VAGUE
-    roots, found = polish(motion, some.sigma[vague], np.concatenate([some.sigma, some.sigma.conj()]))
-    return Roots(
-        np.concatenate([some.sigma[~vague], roots.sigma[found]]),
-        np.concatenate([some.error[~vague], roots.error[found]]),
-    )
+    """Zeros from a circle; those that its series does not tell to rounding by secants, or left out if it does not tell
+    them at all."""
+    unsure = np.flatnonzero(some.error > SURE * (1.0 + np.abs(some.sigma)))
+    roots, found = polish(motion, some.sigma[unsure], np.concatenate([some.sigma, some.sigma.conj()]))
+    found &= roots.error < some.error[unsure]
+    sigma, error = some.sigma.copy(), some.error.copy()
+    sigma[unsure[found]], error[unsure[found]] = roots.sigma[found], roots.error[found]
+    kept = error <= VAGUE
+    return Roots(sigma[kept], error[kept])
 
 
 def growing_real(motion: Motion, known: Roots) -> Roots:
