@@ -78,7 +78,7 @@ def off(found: Stability, k: int) -> tuple[float, str]:
     if shapes.system.w_f == 0.0:
         return np.nan, "no fish"
     sigma = found.eigenvalues[k][0] / abs(shapes.gamma)
-    march = peers.orthonormal(limited(peers.by_scipy("DOP853", RTOL)), PIECES)
+    march = peers.orthogonal(limited(peers.by_scipy("DOP853", RTOL)), PIECES)
     try:
         with np.errstate(all="ignore"):
             other = peers.by_secants(shapes, k, sigma * (1.0 + 1e-6), march)

@@ -19,6 +19,8 @@ SPIN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 ONE = np.eye(3)
 SECANTS = 12
 CLOSE = 1e-14
+# Condition of motions of unit length that are all but parallel.
+PARALLEL = 1e3
 # Of complex steps, in which nothing cancels.
 STEP = 1e-30
 # Of extrapolation.
@@ -160,17 +162,21 @@ def by_scipy(method: str, rtol: float) -> Callable:
     return march
 
 
-def orthonormal(march: Callable, pieces: int) -> Callable:
-    """A march in so many pieces, each from motions that are made orthonormal: on a long cable those that grow fastest
-    hide the others, and with them the zero of D, which is the same."""
+def orthogonal(march: Callable, pieces: int) -> Callable:
+    """A march in so many pieces, after which motions that are all but parallel are made orthogonal, of one size, with
+    the same D: on a long cable those that grow fastest hide the others, and with them the zeros of D."""
 
     def marched(slopes: Callable, length: float, start: Array) -> Array:
         state = start
         for _ in range(pieces):
             state = march(slopes, length / pieces, state)
-            basis, factors = np.linalg.qr(state[6:].reshape(6, 3))
-            turns = np.diag(factors) / np.abs(np.diag(factors))
-            state = np.concatenate([state[:6], (basis * turns).ravel()])
+            motions = state[6:].reshape(6, 3)
+            if np.linalg.cond(motions / np.linalg.norm(motions, axis=0)) < PARALLEL:
+                continue
+            basis, factors = np.linalg.qr(motions)
+            sizes = np.abs(np.diag(factors))
+            turns = np.diag(factors) / sizes
+            state = np.concatenate([state[:6], (basis * turns * np.cbrt(sizes).prod()).ravel()])
         return state
 
     return marched
