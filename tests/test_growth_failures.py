@@ -14,6 +14,7 @@ from towatlas.scene.sweeps import sweep
 from towatlas.scene.verdicts import verdicts_of
 from towatlas.solve.equilibria import solve_equilibria
 from towatlas.solve.galerkin import modes
+from towatlas.solve.krein import SPEED, Collisions, Domain
 from towatlas.solve.motion import BOUND, motions
 from towatlas.solve.positions import errors_with_fish
 from towatlas.solve.spectrum import polish, together
@@ -166,6 +167,25 @@ def test_what_is_past_the_end_of_a_series_is_in_its_errors(place):
     roots, found = polish(motion, some.sigma, some.sigma)
     assert found.any()
     assert (np.abs(roots.sigma - some.sigma) <= some.error + roots.error)[found].all()
+
+
+def test_collisions_do_not_move_by_what_is_past_the_end_of_a_series():
+    """Where modes are many: of 16 values on a circle the last orders moved this edge of flutter by 5e-5."""
+    n, w_f, lam, gamma = 3, 1245.4608370683763, 25.872138860565258, 19.15553069559239
+    one = Collisions(np.array([n]), np.array([w_f]), Domain())
+    start = [
+        np.log(0.007152617870692612 * gamma**2),
+        np.log(gamma),
+        np.log(lam - one.threshold[0]),
+        0.07179705117305357,
+    ]
+    (z,), found = one.solve(np.array([start]), np.zeros(1, np.int64), -1)
+    assert found[0]
+    edge, counts = np.exp(z[SPEED]), []
+    for speed in (edge * (1.0 - 1e-9), edge * (1.0 + 1e-9)):
+        shapes = towatlas.equilibria(lam, w_f, speed)
+        counts.append(spectrum_of(shapes, list(shapes.branch).index(f"{n} inner")).unstable)
+    assert counts == [4, 2]
 
 
 def test_what_is_known_is_told_where_the_patience_ends(monkeypatch):

@@ -19,15 +19,18 @@ from towatlas.numerics.rows import solve_systems
 from towatlas.results_motion import Boundary
 from towatlas.solve.critical import solve_rows
 from towatlas.solve.jets import jets_of
-from towatlas.solve.motion import Array, Integers, Motions, motions
+from towatlas.solve.motion import Array, Integers, Motion, Motions, motions
+from towatlas.solve.positions import ROUNDED
 from towatlas.solve.shots import shoot
+from towatlas.solve.spectrum import noise_of
 from towatlas.system import nondense_rows
 
 # log of the offset of the fish, of the speed, of the length beyond the threshold, and s.
 X, SPEED, EXCESS, S = range(4)
 UNKNOWNS = 4
-# Differences of the unknowns for slopes; circle of D around s, and points of its upper half.
-DIFFERENCE, RADIUS, HALF = 1e-5, 0.15, 9
+# Differences of the unknowns for slopes; circle of D around s, and points of its upper half: what is past the end of
+# the series shows at its lowest orders, and with half as many it moved speeds by 1e-4.
+DIFFERENCE, RADIUS, HALF = 1e-5, 0.15, 17
 STEPS = Steps(first=0.01, longest=0.25, shortest=1e-6, near=1e-6, bent=0.3, easy=3, corrections=8, points=400)
 ROUNDS, LONGEST, SETTLED, NOISE = 20, 0.2, 1e-11, 1e-8
 # Solved for side by side: the series of their shapes are held in memory.
@@ -71,9 +74,28 @@ class Collisions:
         r = np.exp(z[:, X])
         ends = shoot(r, gamma, systems, SLOPE)
         miss = np.log(np.hypot(ends.X[:, 0], ends.Y[:, 0])) - 2.0 * z[:, SPEED]
-        reach = 1.0 + np.sqrt(np.abs(z[:, S]) + RADIUS)
-        bodies = motions(r / gamma**2, gamma, systems, reach, pool=self.pool)
+        bodies = self._bodies(z, rows)
         sound = (ends.status == status.OK) & np.array([body.status == status.OK for body in bodies])
+        terms, _ = self._series(z, bodies)
+        slope = np.stack([np.zeros(len(z)), terms[:, 1] / RADIUS, 2.0 * terms[:, 2] / RADIUS], axis=1)
+        return np.stack([miss, terms[:, 0], terms[:, 1]], axis=1), slope, ends.log_rho[:, 1], sound
+
+    def noise(self, z: Array, rows: Integers) -> Array:
+        """What values are not known by: rounding, and what is past the end of the series, shape (points, 3)."""
+        bodies = self._bodies(z, rows)
+        terms, size = self._series(z, bodies)
+        steps = np.array([len(body.sizes) for body in bodies])
+        # Terms fall ever faster: twice as far along they are less than the square.
+        of_series = noise_of(steps, size, np.zeros(len(z), complex)) + np.square(terms[:, -1])
+        return np.stack([ROUNDED * np.sqrt(steps), of_series, of_series], axis=1)
+
+    def _bodies(self, z: Array, rows: Integers) -> list[Motion]:
+        gamma = np.exp(z[:, SPEED])
+        reach = 1.0 + np.sqrt(np.abs(z[:, S]) + RADIUS)
+        return motions(np.exp(z[:, X]) / gamma**2, gamma, self.systems(z, rows), reach, pool=self.pool)
+
+    def _series(self, z: Array, bodies: list[Motion]) -> tuple[Array, Array]:
+        """Of D in s over the radius of the circle, shape (points, HALF), of unit length, and how long they were."""
         turn = np.exp(1j * np.pi * np.arange(HALF) / (HALF - 1))
         points = z[:, S, None] + RADIUS * turn
         owner = np.repeat(np.arange(len(z)), HALF)
@@ -81,11 +103,9 @@ class Collisions:
         values, logs = values.reshape(points.shape), logs.reshape(points.shape)
         values = values * np.exp(logs - logs.max(axis=1)[:, None])
         circle = np.concatenate([values, values[:, -2:0:-1].conj()], axis=1)
-        series = np.fft.fft(circle, axis=1).real / circle.shape[1]
-        size = np.sqrt(np.square(series[:, :HALF]).sum(axis=1))
-        terms = series[:, :3] / size[:, None]
-        slope = np.stack([np.zeros(len(z)), terms[:, 1] / RADIUS, 2.0 * terms[:, 2] / RADIUS], axis=1)
-        return np.stack([miss, terms[:, 0], terms[:, 1]], axis=1), slope, ends.log_rho[:, 1], sound
+        series = np.fft.fft(circle, axis=1).real[:, :HALF] / circle.shape[1]
+        size = np.sqrt(np.square(series).sum(axis=1))
+        return series / size[:, None], size
 
     # Newton's method may go far astray: what overflows there is not sound.
     @np.errstate(over="ignore", divide="ignore", invalid="ignore")
@@ -244,9 +264,11 @@ def _whole(equations: Collisions, ahead: Curve, back: Curve) -> tuple[Boundary, 
     value, jacobian, _, _ = equations(points, rows)
     gradient = np.zeros((len(points), 1, UNKNOWNS))
     gradient[:, 0] = tangents(jacobian)
-    step = solve_systems(
-        np.concatenate([jacobian, gradient], axis=1), np.concatenate([-value, np.zeros((len(points), 1))], 1)
-    )
+    matrix = np.concatenate([jacobian, gradient], axis=1)
+    error = np.abs(solve_systems(matrix, np.concatenate([-value, np.zeros((len(points), 1))], 1))[:, SPEED])
+    noise = equations.noise(points, rows)
+    for k in range(noise.shape[1]):
+        error += np.abs(solve_systems(matrix, noise[:, k, None] * np.eye(UNKNOWNS)[k])[:, SPEED])
     gamma = np.exp(points[:, SPEED])
     found = Boundary(
         n=int(equations.n[0]),
@@ -256,7 +278,7 @@ def _whole(equations: Collisions, ahead: Curve, back: Curve) -> tuple[Boundary, 
         omega=np.sqrt(np.maximum(points[:, S], 0.0)),
         r_f=np.exp(points[:, X]) / gamma**2,
         turns=np.array(turns, np.int64),
-        error=np.maximum(np.abs(step[:, SPEED]), np.finfo(float).eps),
+        error=error,
         begins=begins(jacobian),
         kinds=(kinds[0], kinds[1]),
     )
