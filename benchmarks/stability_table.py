@@ -7,13 +7,18 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+import xarray as xr
 
 import towatlas
 from towatlas.builders.grids import StabilityGrid
 from towatlas.kernels import status
 from towatlas.limits import unchecked_threshold_length
+from towatlas.solve.stability import spectrum_of
 
 Array = np.ndarray
+# Of the curves in the file; and a distance in speed, relative, at which what grows slowly is told from what does not.
+POINT = ("n", "w_f", "lam", "gamma", "error", "turn")
+LEAST = 1e-9
 
 
 def cables(n: int, count: int, rng: np.random.Generator) -> tuple[Array, Array, Array]:
@@ -69,6 +74,30 @@ def boundaries(atlas: towatlas.Atlas, count: int, rng: np.random.Generator) -> s
     )
 
 
+def curves(path: Path, count: int, rng: np.random.Generator) -> str:
+    """At how many points of curves, off ends and turning points, what grows changes its number within their error."""
+    with xr.open_dataset(path, group="support/stability") as group:
+        held = {name: group[f"stability_{name}"].values for name in ("row_size", *(f"curve_{part}" for part in POINT))}
+    sizes = held["row_size"]
+    row, first = np.repeat(np.arange(len(sizes)), sizes), np.cumsum(sizes) - sizes
+    places = np.arange(len(row)) - first[row]
+    inner = np.flatnonzero((places > 0) & (places < sizes[row] - 1) & (held["curve_turn"] == 0))
+    changed, uncounted, chosen = 0, 0, rng.choice(inner, count, replace=False)
+    for i in chosen:
+        n, w_f = int(held["curve_n"][row[i]]), float(held["curve_w_f"][row[i]])
+        lam, gamma = float(held["curve_lam"][i]), float(held["curve_gamma"][i])
+        apart, numbers = max(LEAST, float(held["curve_error"][i])), []
+        for speed in (gamma * (1.0 - apart), gamma * (1.0 + apart)):
+            found = towatlas.equilibria(lam, w_f, speed)
+            numbers.append(spectrum_of(found, list(found.branch).index(f"{n} inner")).counted)
+        uncounted += -1 in numbers
+        changed += -1 not in numbers and numbers[0] != numbers[1]
+    return (
+        f"of {count} points of {len(sizes)} curves what grows changes its number at {changed} within the error stated, "
+        f"or {LEAST:g}; at {uncounted} it was not counted; stated {_sizes(held['curve_error'][chosen])}"
+    )
+
+
 def _sizes(values: list[float] | Array) -> str:
     return f"{np.median(values):.1e} in the median, {np.max(values):.1e} at most"
 
@@ -84,6 +113,7 @@ def main() -> None:
     for n in range(1, 4):
         print(growth(atlas, n, options.points, rng), flush=True)
     print(boundaries(atlas, options.boundaries, rng), flush=True)
+    print(curves(options.atlas, options.boundaries, rng), flush=True)
 
 
 if __name__ == "__main__":
