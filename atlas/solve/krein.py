@@ -28,9 +28,11 @@ from towatlas.system import nondense_rows
 # log of the offset of the fish, of the speed, of the length beyond the threshold, and s.
 X, SPEED, EXCESS, S = range(4)
 UNKNOWNS = 4
-# Differences of the unknowns for slopes; circle of D around s, and points of its upper half: what is past the end of
-# the series shows at its lowest orders, and with half as many it moved speeds by 1e-4.
+# Differences of the unknowns for slopes; circle of D around s, and points of its upper half.
 DIFFERENCE, RADIUS, HALF = 1e-5, 0.15, 17
+# With so many, enough to follow a curve by, what is past the end of the series moves speeds by up to 2e-3; points are
+# then solved for by so many steps of Newton's method, none of them longer than the last.
+HALF_FOLLOWED, POLISHING, FAR = 9, 12, 0.02
 STEPS = Steps(first=0.01, longest=0.25, shortest=1e-6, near=1e-6, bent=0.3, easy=3, corrections=8, points=400)
 ROUNDS, LONGEST, SETTLED, NOISE = 20, 0.2, 1e-11, 1e-8
 # Solved for side by side: the series of their shapes are held in memory.
@@ -58,8 +60,8 @@ class Domain:
 class Collisions:
     """Equations of Krein collisions, of rows of n and w_f."""
 
-    def __init__(self, n: Integers, w_f: Array, domain: Domain, pool: Executor | None = None):
-        self.n, self.w_f, self.domain, self.pool = n, w_f, domain, pool
+    def __init__(self, n: Integers, w_f: Array, domain: Domain, pool: Executor | None = None, half: int = HALF):
+        self.n, self.w_f, self.domain, self.pool, self.half = n, w_f, domain, pool, half
         self.threshold = unchecked_threshold_length(w_f, n)
 
     def systems(self, z: Array, rows: Integers) -> Array:
@@ -95,15 +97,15 @@ class Collisions:
         return motions(np.exp(z[:, X]) / gamma**2, gamma, self.systems(z, rows), reach, pool=self.pool)
 
     def _series(self, z: Array, bodies: list[Motion]) -> tuple[Array, Array]:
-        """Of D in s over the radius of the circle, shape (points, HALF), of unit length, and how long they were."""
-        turn = np.exp(1j * np.pi * np.arange(HALF) / (HALF - 1))
+        """Of D in s over the radius of the circle, shape (points, half), of unit length, and how long they were."""
+        turn = np.exp(1j * np.pi * np.arange(self.half) / (self.half - 1))
         points = z[:, S, None] + RADIUS * turn
-        owner = np.repeat(np.arange(len(z)), HALF)
+        owner = np.repeat(np.arange(len(z)), self.half)
         values, logs = Motions(bodies, self.pool).evans(owner, 1j * np.sqrt(points.astype(complex)).ravel())
         values, logs = values.reshape(points.shape), logs.reshape(points.shape)
         values = values * np.exp(logs - logs.max(axis=1)[:, None])
         circle = np.concatenate([values, values[:, -2:0:-1].conj()], axis=1)
-        series = np.fft.fft(circle, axis=1).real[:, :HALF] / circle.shape[1]
+        series = np.fft.fft(circle, axis=1).real[:, : self.half] / circle.shape[1]
         size = np.sqrt(np.square(series).sum(axis=1))
         return series / size[:, None], size
 
@@ -210,7 +212,7 @@ def boundaries(start: Array, n: Integers, w_f: Array, domain: Domain, pool: Exec
         # One curve of each n and w_f at a time.
         _, first = np.unique(np.stack([n[left].astype(float), w_f[left]]), axis=1, return_index=True)
         now = left[np.sort(first)]
-        equations = Collisions(n[now], w_f[now], domain, pool)
+        equations = Collisions(n[now], w_f[now], domain, pool, HALF_FOLLOWED)
         rows = np.arange(len(now))
         direction = tangents(equations(start[now], rows)[1])
         halves = [follow(equations, start[now], side * direction, _stop, STEPS) for side in (1.0, -1.0)]
@@ -261,11 +263,19 @@ def _whole(equations: Collisions, ahead: Curve, back: Curve) -> tuple[Boundary, 
             turns.append(k)
         k += 1
     rows = np.zeros(len(points), np.int64)
-    value, jacobian, _, _ = equations(points, rows)
-    gradient = np.zeros((len(points), 1, UNKNOWNS))
-    gradient[:, 0] = tangents(jacobian)
-    matrix = np.concatenate([jacobian, gradient], axis=1)
-    error = np.abs(solve_systems(matrix, np.concatenate([-value, np.zeros((len(points), 1))], 1))[:, SPEED])
+    matrix, step = _newton(equations, points)
+    for _ in range(POLISHING):
+        size = np.linalg.norm(step, axis=1)
+        left = np.flatnonzero((size > SETTLED) & (size < FAR))
+        if not len(left):
+            break
+        # Next to a cusp steps may lead astray: a point stays where the next one is no shorter.
+        tried = points[left] + step[left]
+        there, further = _newton(equations, tried)
+        better = np.linalg.norm(further, axis=1) < size[left]
+        k = left[better]
+        points[k], matrix[k], step[k] = tried[better], there[better], further[better]
+    jacobian, error = matrix[:, :3], np.abs(step[:, SPEED])
     noise = equations.noise(points, rows)
     for k in range(noise.shape[1]):
         error += np.abs(solve_systems(matrix, noise[:, k, None] * np.eye(UNKNOWNS)[k])[:, SPEED])
@@ -283,6 +293,13 @@ def _whole(equations: Collisions, ahead: Curve, back: Curve) -> tuple[Boundary, 
         kinds=(kinds[0], kinds[1]),
     )
     return found, points
+
+
+def _newton(equations: Collisions, points: Array) -> tuple[Array, Array]:
+    """Matrices of Newton's method across a curve, and its steps."""
+    value, jacobian, _, _ = equations(points, np.zeros(len(points), np.int64))
+    matrix = np.concatenate([jacobian, tangents(jacobian)[:, None]], axis=1)
+    return matrix, solve_systems(matrix, np.concatenate([-value, np.zeros((len(points), 1))], axis=1))
 
 
 def _turning(equations: Collisions, z: Array) -> Array:
